@@ -1,0 +1,84 @@
+#include "core/mesh/quality.h"
+
+#include <Eigen/Geometry>
+#include <cmath>
+#include <string>
+
+#include "core/numerics/error.h"
+
+namespace shaped {
+namespace {
+
+/// Twice the area vector of a face.
+Eigen::RowVector3d doubleAreaVector(const Faces& faces, const Vertices& vertices, Eigen::Index face) {
+  const Eigen::RowVector3d origin = vertices.row(faces(face, 0));
+  return (vertices.row(faces(face, 1)) - origin).cross(vertices.row(faces(face, 2)) - origin);
+}
+
+void normalizeRows(Vertices& rows) {
+  for (Eigen::Index i = 0; i < rows.rows(); ++i) rows.row(i) = rows.row(i).stableNormalized();
+}
+
+Eigen::VectorXd vertexDistances(const Vertices& one, const Vertices& two) {
+  if (one.rows() < 1) throw InvalidInput("shape", "has no vertices to compare");
+  if (one.rows() != two.rows())
+    throw InvalidInput("shape", "has " + std::to_string(two.rows()) + " vertices, want " + std::to_string(one.rows()));
+  return (one - two).rowwise().norm();
+}
+
+}  // namespace
+
+Eigen::VectorXd triangleAreas(const Faces& faces, const Vertices& vertices) {
+  return Eigen::VectorXd::NullaryExpr(
+      faces.rows(), [&](Eigen::Index f) { return 0.5 * doubleAreaVector(faces, vertices, f).norm(); });
+}
+
+Eigen::VectorXd triangleQualities(const Faces& faces, const Vertices& vertices) {
+  const auto quality = [&](Eigen::Index f) {
+    double squared_edges = 0;
+    for (int c = 0; c < 3; ++c)
+      squared_edges += (vertices.row(faces(f, (c + 1) % 3)) - vertices.row(faces(f, c))).squaredNorm();
+    const double area = 0.5 * doubleAreaVector(faces, vertices, f).norm();
+    return squared_edges > 0 ? 4 * std::sqrt(3.0) * area / squared_edges : 0.0;
+  };
+  return Eigen::VectorXd::NullaryExpr(faces.rows(), quality);
+}
+
+double smallestAreaRatio(const Faces& faces, const Vertices& reference, const Vertices& shape) {
+  if (shape.rows() != reference.rows())
+    throw InvalidInput("shape",
+                       "has " + std::to_string(shape.rows()) + " vertices, want " + std::to_string(reference.rows()));
+  return (triangleAreas(faces, shape).array() / triangleAreas(faces, reference).array()).minCoeff();
+}
+
+Vertices faceNormals(const Faces& faces, const Vertices& vertices) {
+  Vertices normals(faces.rows(), 3);
+  for (Eigen::Index f = 0; f < faces.rows(); ++f) normals.row(f) = doubleAreaVector(faces, vertices, f);
+  normalizeRows(normals);
+  return normals;
+}
+
+Vertices vertexNormals(const Faces& faces, const Vertices& vertices) {
+  Vertices normals = Vertices::Zero(vertices.rows(), 3);
+  for (Eigen::Index f = 0; f < faces.rows(); ++f) {
+    const Eigen::RowVector3d area = doubleAreaVector(faces, vertices, f);
+    for (int c = 0; c < 3; ++c) normals.row(faces(f, c)) += area;
+  }
+  normalizeRows(normals);
+  return normals;
+}
+
+double boundingBoxDiagonal(const Vertices& vertices) {
+  if (vertices.rows() == 0) return 0;
+  return (vertices.colwise().maxCoeff() - vertices.colwise().minCoeff()).norm();
+}
+
+double meanVertexDistance(const Vertices& one, const Vertices& two) { return vertexDistances(one, two).mean(); }
+
+double rmsVertexDistance(const Vertices& one, const Vertices& two) {
+  return std::sqrt(vertexDistances(one, two).squaredNorm() / static_cast<double>(one.rows()));
+}
+
+double maxVertexDistance(const Vertices& one, const Vertices& two) { return vertexDistances(one, two).maxCoeff(); }
+
+}  // namespace shaped
