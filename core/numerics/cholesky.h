@@ -1,0 +1,51 @@
+#pragma once
+
+#include <memory>
+
+#include "core/numerics/block_matrix.h"
+#include "core/numerics/pins.h"
+
+namespace shaped {
+
+/// Fill-reducing ordering and symbolic factorisation of one pattern, made once per topology and shared by every factor.
+/// METIS orders the nodes; CHOLMOD's supernodal method is used where it is built in, Eigen's simplicial one elsewhere.
+class CholeskyAnalysis {
+ public:
+  explicit CholeskyAnalysis(BlockPatternPtr pattern);
+  ~CholeskyAnalysis();
+  CholeskyAnalysis(const CholeskyAnalysis&) = delete;
+  CholeskyAnalysis& operator=(const CholeskyAnalysis&) = delete;
+
+  const BlockPatternPtr& pattern() const { return pattern_; }
+
+ private:
+  friend class CholeskyFactor;
+  struct Impl;
+  BlockPatternPtr pattern_;
+  std::unique_ptr<Impl> impl_;
+};
+
+using CholeskyAnalysisPtr = std::shared_ptr<const CholeskyAnalysis>;
+
+/// L L^T of P A P plus the identity on pinned unknowns, for matrices over one pattern. One object per thread.
+class CholeskyFactor {
+ public:
+  explicit CholeskyFactor(CholeskyAnalysisPtr analysis);
+  ~CholeskyFactor();
+  CholeskyFactor(CholeskyFactor&&) noexcept;
+  CholeskyFactor& operator=(CholeskyFactor&&) noexcept;
+
+  /// Factorises; false when the matrix restricted to the free unknowns is not positive definite (or not finite), and
+  /// then solve() must not be called.
+  bool factorise(const SymmetricBlockMatrix& matrix, const Pins& pins);
+
+  /// x = A^-1 b with zero in the pinned unknowns; x and b may be the same, `columns` right-hand sides one after another.
+  /// May be called from several threads at once.
+  void solve(const double* b, double* x, int columns = 1) const;
+
+ private:
+  struct Impl;
+  std::unique_ptr<Impl> impl_;
+};
+
+}  // namespace shaped

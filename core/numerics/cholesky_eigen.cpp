@@ -1,0 +1,46 @@
+// Eigen's simplicial factorisation behind core/numerics/cholesky.h, for builds without CHOLMOD's supernodal module.
+#ifndef SHAPED_SUPERNODAL
+
+#include <Eigen/SparseCholesky>
+
+#include "core/numerics/cholesky.h"
+
+namespace shaped {
+
+struct CholeskyAnalysis::Impl {};
+
+CholeskyAnalysis::CholeskyAnalysis(BlockPatternPtr pattern) : pattern_(std::move(pattern)) {}
+CholeskyAnalysis::~CholeskyAnalysis() = default;
+
+struct CholeskyFactor::Impl {
+  Eigen::SimplicialLLT<Eigen::SparseMatrix<double>, Eigen::Lower> solver;
+  bool analysed = false;
+};
+
+CholeskyFactor::CholeskyFactor(CholeskyAnalysisPtr) : impl_(std::make_unique<Impl>()) {}
+CholeskyFactor::~CholeskyFactor() = default;
+CholeskyFactor::CholeskyFactor(CholeskyFactor&&) noexcept = default;
+CholeskyFactor& CholeskyFactor::operator=(CholeskyFactor&&) noexcept = default;
+
+bool CholeskyFactor::factorise(const SymmetricBlockMatrix& matrix, const Pins& pins) {
+  Eigen::SparseMatrix<double> sparse = matrix.toSparse();
+  for (int column = 0; column < sparse.outerSize(); ++column)
+    for (Eigen::SparseMatrix<double>::InnerIterator it(sparse, column); it; ++it)
+      if (pins.pinned(static_cast<std::size_t>(it.row())) || pins.pinned(static_cast<std::size_t>(it.col())))
+        it.valueRef() = it.row() == it.col() ? 1.0 : 0.0;
+  if (!sparse.coeffs().allFinite()) return false;
+  if (!impl_->analysed) impl_->solver.analyzePattern(sparse);
+  impl_->analysed = true;
+  impl_->solver.factorize(sparse);
+  return impl_->solver.info() == Eigen::Success;
+}
+
+void CholeskyFactor::solve(const double* b, double* x, int columns) const {
+  const auto n = impl_->solver.rows();
+  const Eigen::MatrixXd solution = impl_->solver.solve(Eigen::Map<const Eigen::MatrixXd>(b, n, columns));
+  Eigen::Map<Eigen::MatrixXd>(x, n, columns) = solution;
+}
+
+}  // namespace shaped
+
+#endif
