@@ -1,0 +1,52 @@
+#pragma once
+
+#include <grpcpp/channel.h>
+#include <grpcpp/client_context.h>
+#include <grpcpp/support/status.h>
+
+#include <chrono>
+#include <functional>
+#include <memory>
+#include <optional>
+#include <stdexcept>
+#include <stop_token>
+#include <string>
+
+namespace shaped::client {
+
+/// A call that the daemon (or the way to it) answered with an error.
+class RpcError : public std::runtime_error {
+ public:
+  explicit RpcError(const grpc::Status& status)
+      : std::runtime_error(status.error_message()), code_(status.error_code()) {}
+  grpc::StatusCode code() const { return code_; }
+
+ private:
+  grpc::StatusCode code_;
+};
+
+/// Throws RpcError unless the status is OK.
+void require(const grpc::Status& status);
+
+/// Opens a channel to a daemon, "host:port" or any gRPC target; connects on first use. Shared by all stubs of a
+/// program.
+std::shared_ptr<grpc::Channel> connect(const std::string& server);
+
+/// How long calls may take and what aborts them.
+struct CallOptions {
+  std::optional<std::chrono::duration<double>> timeout;  ///< of each call; none: the daemon's own limit
+  std::stop_token stop;                                  ///< cancels the call on the daemon too
+};
+
+/// The context of one call; must outlive it.
+class Call {
+ public:
+  explicit Call(const CallOptions& options);
+  grpc::ClientContext* context() { return &context_; }
+
+ private:
+  grpc::ClientContext context_;
+  std::stop_callback<std::function<void()>> on_stop_;
+};
+
+}  // namespace shaped::client

@@ -1,0 +1,86 @@
+#include "client/shapectl/failure.h"
+
+#include <iostream>
+#include <nlohmann/json.hpp>
+
+#include "core/numerics/error.h"
+
+namespace shaped::shapectl {
+namespace {
+
+constexpr const char* nameOf(ExitCode code) {
+  switch (code) {
+    case ExitCode::kSuccess:
+      return "success";
+    case ExitCode::kInternal:
+      return "internal";
+    case ExitCode::kBadInput:
+      return "bad_input";
+    case ExitCode::kNotFound:
+      return "not_found";
+    case ExitCode::kUnavailable:
+      return "unavailable";
+    case ExitCode::kDeadline:
+      return "deadline";
+    case ExitCode::kCancelled:
+      return "cancelled";
+    case ExitCode::kNotConverged:
+      return "not_converged";
+  }
+  return "internal";
+}
+
+ExitCode report(const Session& session, ExitCode code, const std::string& message) {
+  if (session.json)
+    std::cout << nlohmann::json{{"error", {{"kind", nameOf(code)}, {"message", message}}}}.dump(
+                     2, ' ', false, nlohmann::json::error_handler_t::replace)
+              << "\n";
+  else
+    std::cerr << "shapectl: " << message << "\n";
+  return code;
+}
+
+}  // namespace
+
+ExitCode exitCodeOf(grpc::StatusCode code) {
+  switch (code) {
+    case grpc::OK:
+      return ExitCode::kSuccess;
+    case grpc::INVALID_ARGUMENT:
+    case grpc::OUT_OF_RANGE:
+    case grpc::ALREADY_EXISTS:
+    case grpc::FAILED_PRECONDITION:
+      return ExitCode::kBadInput;
+    case grpc::NOT_FOUND:
+      return ExitCode::kNotFound;
+    case grpc::UNAVAILABLE:
+    case grpc::RESOURCE_EXHAUSTED:
+      return ExitCode::kUnavailable;
+    case grpc::DEADLINE_EXCEEDED:
+      return ExitCode::kDeadline;
+    case grpc::CANCELLED:
+      return ExitCode::kCancelled;
+    default:
+      return ExitCode::kInternal;
+  }
+}
+
+ExitCode reportingFailures(const Session& session, const std::function<ExitCode()>& verb) {
+  try {
+    return verb();
+  } catch (const InvalidInput& error) {
+    return report(session, ExitCode::kBadInput, error.what());
+  } catch (const client::RpcError& error) {
+    if (session.stop.stop_requested()) return report(session, ExitCode::kCancelled, "cancelled");
+    const auto code = exitCodeOf(error.code());
+    const bool unreachable = error.code() == grpc::UNAVAILABLE;
+    return report(session, code,
+                  unreachable ? "no daemon answers at " + session.server + " (" + error.what() +
+                                    "); start shaped or name another with --server"
+                              : error.what());
+  } catch (const std::exception& error) {
+    return report(session, ExitCode::kInternal, error.what());
+  }
+}
+
+}  // namespace shaped::shapectl

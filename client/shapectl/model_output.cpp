@@ -1,0 +1,23 @@
+#include "client/shapectl/model_output.h"
+
+#include "client/shapectl/output.h"
+
+namespace shaped::shapectl {
+
+nlohmann::json toJson(const v1::ModelDescription& description) {
+  nlohmann::json document{{"kind", description.kind()},
+                          {"topology_id", description.topology_id()},
+                          {"vertices", description.vertex_count()},
+                          {"faces", description.face_count()},
+                          {"created", timeText(description.created())},
+                          {"dataset", description.dataset()}};
+  addModel(document, description.model());
+  addReport(document["training"], description.training());
+  const auto& pga = description.shell_pga();
+  document["shell_pga"] = {
+      {"training_shapes", pga.training_shapes()}, {"modes", pga.modes()},     {"path_steps", pga.path_steps()},
+      {"coarse_vertices", pga.coarse_vertices()}, {"bending", pga.bending()}, {"eigenvalues", pga.eigenvalues()}};
+  return document;
+}
+
+}  // namespace shaped::shapectl

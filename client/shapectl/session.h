@@ -1,0 +1,27 @@
+#pragma once
+
+#include <optional>
+#include <stop_token>
+#include <string>
+
+#include "client/connection.h"
+
+namespace shaped::shapectl {
+
+/// What all verbs share: the global options, and the token that Ctrl-C fires.
+struct Session {
+  std::string server;             ///< "host:port"
+  bool json = false;              ///< --output json
+  std::optional<double> timeout;  ///< of each call [s]
+  std::stop_token stop;
+
+  /// The channel to the daemon; only verbs that need one call this.
+  std::shared_ptr<grpc::Channel> channel() const { return client::connect(server); }
+  client::CallOptions callOptions() const {
+    client::CallOptions options{.timeout = {}, .stop = stop};
+    if (timeout) options.timeout = std::chrono::duration<double>(*timeout);
+    return options;
+  }
+};
+
+}  // namespace shaped::shapectl
