@@ -1,0 +1,89 @@
+#include "core/shell/shell_objective.h"
+
+namespace shaped {
+
+ShellObjective::ShellObjective(ShellStructurePtr structure, double bending)
+    : structure_(std::move(structure)), bending_(bending), average_(structure_->topology()) {}
+
+void ShellObjective::addUndeformed(const ShellMeasures& undeformed, double weight) {
+  average_.add(structure_->topology(), undeformed, bending_, weight);
+  noise_ += 1e-14 * weight * undeformed.area.sum();
+  if (!reference_norm_) undeformed_.push_back({undeformed, weight});
+}
+
+void ShellObjective::addDeformed(ShellMeasures deformed, double weight) {
+  noise_ += 1e-14 * weight * deformed.area.sum();
+  deformed_.push_back({std::move(deformed), weight});
+}
+
+void ShellObjective::update(const Eigen::VectorXd& x) {
+  shape_ = unflatten(x);
+  measure(structure_->topology(), shape_, measures_);
+}
+
+double ShellObjective::value(const Eigen::VectorXd& x) {
+  update(x);
+  double sum = average_.value(structure_->topology(), measures_);
+  for (const auto& term : deformed_)
+    sum += term.weight * shellEnergy(structure_->topology(), measures_, term.measures, bending_);
+  return sum;
+}
+
+double ShellObjective::gradient(const Eigen::VectorXd& x, Eigen::VectorXd& gradient) {
+  update(x);
+  const auto& topology = structure_->topology();
+  if (!reference_norm_) reference_norm_ = measureReferenceNorm();
+  MeasureGradient measures(topology);
+  average_.addGradient(topology, measures_, 1, measures);
+  for (const auto& term : deformed_)
+    addFirstGradient(topology, measures_, term.measures, bending_, term.weight, measures);
+  Vertices result = Vertices::Zero(shape_.rows(), 3);
+  pullBackGradient(topology, shape_, measures, result);
+  gradient = flatten(result);
+  return *reference_norm_;
+}
+
+double ShellObjective::measureReferenceNorm() const {
+  const auto& topology = structure_->topology();
+  double sum = 0, weights = 0;
+  const auto add = [&](const MeasureGradient& measures, double weight) {
+    Vertices force = Vertices::Zero(shape_.rows(), 3);
+    pullBackGradient(topology, shape_, measures, force);
+    sum += force.norm();
+    weights += weight;
+  };
+  MeasureGradient measures(topology);
+  for (const auto& term : undeformed_) {
+    measures.setZero();
+    addSecondGradient(topology, term.measures, measures_, bending_, term.weight, measures);
+    add(measures, term.weight);
+  }
+  for (const auto& term : deformed_) {
+    measures.setZero();
+    addFirstGradient(topology, measures_, term.measures, bending_, term.weight, measures);
+    add(measures, term.weight);
+  }
+  return sum + weights * forceFloor(measures_);
+}
+
+void ShellObjective::hessian(const Eigen::VectorXd& x, bool projected, SymmetricBlockMatrix& hessian) {
+  update(x);
+  const auto& topology = structure_->topology();
+  MeasureCurvature curvature(topology, projected ? HessianKind::kProjected : HessianKind::kExact);
+  average_.addCurvature(topology, measures_, 1, curvature);
+  for (const auto& term : deformed_)
+    addFirstCurvature(topology, measures_, term.measures, bending_, term.weight, curvature);
+  pullBackHessian(*structure_, shape_, curvature, hessian);
+}
+
+Pins ShellObjective::pins(const Eigen::VectorXd& x) { return fixed_pins_ ? *fixed_pins_ : gaugePins(unflatten(x)); }
+
+Solved<Vertices> minimiseShell(ShellObjective& objective, const ShellStructure& structure, const Vertices& start,
+                               const NewtonOptions& options) {
+  auto solved = minimise(objective, structure.analysis(), flatten(start), options);
+  return {unflatten(solved.solution), solved};
+}
+
+double forceFloor(const ShellMeasures& measures) { return 1e-8 * std::sqrt(measures.area.sum()); }
+
+}  // namespace shaped

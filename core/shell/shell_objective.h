@@ -1,0 +1,66 @@
+#pragma once
+
+#include <optional>
+
+#include "core/numerics/newton.h"
+#include "core/shell/average_energy.h"
+#include "core/shell/energy.h"
+
+namespace shaped {
+
+/// One free shape in a sum of shell energies,
+///   E(x) = sum_j w_j W[s_j, x] + sum_k v_k W[x, t_k],
+/// for Newton's method. Rigid motions are removed by pinning six unknowns, or by the pins given.
+///
+/// The residual's reference norm is the sum over the terms of the norm of each one's force at the first iterate: the
+/// size of the forces that balance at the minimum.
+class ShellObjective : public NewtonObjective {
+ public:
+  ShellObjective(ShellStructurePtr structure, double bending);
+
+  /// Adds weight W[undeformed, x]; weight >= 0.
+  void addUndeformed(const ShellMeasures& undeformed, double weight);
+  /// Adds weight W[x, deformed]; weight >= 0.
+  void addDeformed(ShellMeasures deformed, double weight);
+  /// Holds these unknowns instead of the gauge's; they must determine the rigid motion.
+  void setPins(Pins pins) { fixed_pins_ = std::move(pins); }
+  /// A reference norm known beforehand, which spares its evaluation.
+  void setReferenceNorm(double norm) { reference_norm_ = norm; }
+
+  double value(const Eigen::VectorXd& x) override;
+  double noise() const override { return noise_; }
+  double gradient(const Eigen::VectorXd& x, Eigen::VectorXd& gradient) override;
+  void hessian(const Eigen::VectorXd& x, bool projected, SymmetricBlockMatrix& hessian) override;
+  Pins pins(const Eigen::VectorXd& x) override;
+
+ private:
+  struct Term {
+    ShellMeasures measures;
+    double weight;
+  };
+  void update(const Eigen::VectorXd& x);
+  double measureReferenceNorm() const;
+
+  ShellStructurePtr structure_;
+  double bending_;
+  AverageEnergy average_;
+  std::vector<Term> undeformed_, deformed_;
+  std::optional<Pins> fixed_pins_;
+  std::optional<double> reference_norm_;
+  double noise_ = 0;
+  Vertices shape_;
+  ShellMeasures measures_;
+};
+
+/// The flat vector of a shape's coordinates and back.
+inline Eigen::VectorXd flatten(const Vertices& shape) { return Eigen::Map<const Eigen::VectorXd>(shape.data(), shape.size()); }
+inline Vertices unflatten(const Eigen::VectorXd& x) { return Eigen::Map<const Vertices>(x.data(), x.size() / 3, 3); }
+
+/// Minimises the objective from `start`, V x 3.
+Solved<Vertices> minimiseShell(ShellObjective& objective, const ShellStructure& structure, const Vertices& start,
+                               const NewtonOptions& options);
+
+/// Reference forces are never taken smaller than this: a relative strain of about 1e-8, where rounding begins.
+double forceFloor(const ShellMeasures& measures);
+
+}  // namespace shaped
