@@ -42,7 +42,7 @@ class Dictionary {
       else if (key == "shape")
         parseShape(header), has_shape_ = true;
       else
-        fail("has the unknown key " + quoted(key) + " in its header");
+        fail("has the unknown key " + quotedWord(key) + " in its header");
       if (!accept(',') && peek() != '}') fail("has a header that is no dictionary");
     }
     if (peek() != '\0') fail("has text after the dictionary in its header");
@@ -86,7 +86,8 @@ class Dictionary {
       header.type = type;
       return;
     }
-    fail("holds numbers of type " + quoted(name) + "; want integers or floats of at most 8 bytes (f4, f8, i4, ...)");
+    fail("holds numbers of type " + quotedWord(name) +
+         "; want integers or floats of at most 8 bytes (f4, f8, i4, ...)");
   }
 
   void parseOrder() {

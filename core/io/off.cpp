@@ -13,7 +13,8 @@ void requireKeyword(TextScanner& scanner, const std::string& file) {
   const auto whole = keyword;
   for (const std::string_view prefix : {"ST", "C", "N"})
     if (keyword.starts_with(prefix)) keyword.remove_prefix(prefix.size());
-  if (keyword != "OFF") scanner.fail(quoted(whole) + " is not the keyword of a three-dimensional OFF file; want OFF");
+  if (keyword != "OFF")
+    scanner.fail(quotedWord(whole) + " is not the keyword of a three-dimensional OFF file; want OFF");
 }
 
 void nextLineOf(TextScanner& scanner, const char* element, std::int64_t index, std::int64_t count,

@@ -20,13 +20,13 @@ class AsciiBody {
     const auto word = nextWord();
     double value = 0;
     if (word.empty()) throw InvalidInput(file_, "is truncated: ends before the data its header promises");
-    if (!parseNumber(word, value)) throw InvalidInput(file_, quoted(word) + " stands where a number should");
+    if (!parseNumber(word, value)) throw InvalidInput(file_, quotedWord(word) + " stands where a number should");
     return value;
   }
 
   void requireEnd() {
     if (const auto word = nextWord(); !word.empty())
-      throw InvalidInput(file_, "goes on with " + quoted(word) + " after the data its header promises");
+      throw InvalidInput(file_, "goes on with " + quotedWord(word) + " after the data its header promises");
   }
 
  private:

@@ -31,7 +31,7 @@ PlyType readType(TextScanner& scanner) {
   const auto word = scanner.word();
   for (const auto& [name, type] : kTypeNames)
     if (name == word) return type;
-  scanner.fail(quoted(word) + " is no PLY number type");
+  scanner.fail(quotedWord(word) + " is no PLY number type");
 }
 
 PlyEncoding readEncoding(TextScanner& scanner) {
@@ -39,7 +39,7 @@ PlyEncoding readEncoding(TextScanner& scanner) {
   if (word == "ascii") return PlyEncoding::kAscii;
   if (word == "binary_little_endian") return PlyEncoding::kLittleEndian;
   if (word == "binary_big_endian") return PlyEncoding::kBigEndian;
-  scanner.fail(quoted(word) + " is no PLY format; want ascii, binary_little_endian or binary_big_endian");
+  scanner.fail(quotedWord(word) + " is no PLY format; want ascii, binary_little_endian or binary_big_endian");
 }
 
 PlyProperty readProperty(TextScanner& scanner) {
@@ -117,7 +117,7 @@ PlyHeader parsePlyHeader(const std::string& file, std::string_view bytes) {
     else if (keyword == "end_header")
       break;
     else if (keyword != "comment" && keyword != "obj_info" && !keyword.empty())
-      scanner.fail(quoted(keyword) + " does not belong in a PLY header here");
+      scanner.fail(quotedWord(keyword) + " does not belong in a PLY header here");
   }
   if (!encoding) throw InvalidInput(file, "has a PLY header without a 'format' line");
   header.encoding = *encoding;

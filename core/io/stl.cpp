@@ -68,7 +68,8 @@ void expect(TextScanner& scanner, const std::string& file, std::initializer_list
         throw InvalidInput(file, "is truncated: ends where '" + std::string(keyword) + "' should stand");
       word = scanner.word();
     }
-    if (lowerCase(word) != keyword) scanner.fail(quoted(word) + " stands where '" + std::string(keyword) + "' should");
+    if (lowerCase(word) != keyword)
+      scanner.fail(quotedWord(word) + " stands where '" + std::string(keyword) + "' should");
   }
 }
 
@@ -99,7 +100,7 @@ MeshFile parseText(const std::string& file, std::string_view text) {
     else if (keyword == (inside ? "endsolid" : "solid"))
       inside = !inside;
     else
-      scanner.fail(quoted(word) + " stands where '" + (inside ? "facet' or 'endsolid" : "solid") + "' should");
+      scanner.fail(quotedWord(word) + " stands where '" + (inside ? "facet' or 'endsolid" : "solid") + "' should");
   }
   if (inside) throw InvalidInput(file, "is truncated: ends without 'endsolid'");
   return welder.finish();

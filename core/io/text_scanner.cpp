@@ -22,7 +22,7 @@ bool parseWhole(std::string_view word, Number& value) {
 
 }  // namespace
 
-std::string quoted(std::string_view word) {
+std::string quotedWord(std::string_view word) {
   constexpr std::size_t longest = 40;
   std::string text = "'";
   for (const char c : word.substr(0, longest)) text += c >= ' ' && c <= '~' ? c : '?';
@@ -84,21 +84,39 @@ std::string_view TextScanner::word() {
   return found;
 }
 
-double TextScanner::number(std::string_view what) {
-  const auto found = word();
+std::vector<std::string_view> TextScanner::fields(char separator) {
+  std::vector<std::string_view> found;
+  // A blank that separates is no padding.
+  const auto blank = [&](char c) { return c != separator && kBlanks.find(c) != std::string_view::npos; };
+  for (bool more = true; more;) {
+    const auto end = line_.find(separator);
+    auto field = line_.substr(0, end);
+    while (!field.empty() && blank(field.front())) field.remove_prefix(1);
+    while (!field.empty() && blank(field.back())) field.remove_suffix(1);
+    found.push_back(field);
+    more = end != std::string_view::npos;
+    line_.remove_prefix(more ? end + 1 : line_.size());
+  }
+  return found;
+}
+
+double TextScanner::numberIn(std::string_view field, std::string_view what) const {
   double value = 0;
-  if (found.empty()) fail("the line ends where " + std::string(what) + " should stand");
-  if (!parseNumber(found, value)) fail(quoted(found) + " is not a number; want " + std::string(what));
+  if (field.empty()) fail("nothing stands where " + std::string(what) + " should");
+  if (!parseNumber(field, value)) fail(quotedWord(field) + " is not a number; want " + std::string(what));
   return value;
 }
 
-std::int64_t TextScanner::integer(std::string_view what) {
-  const auto found = word();
+std::int64_t TextScanner::integerIn(std::string_view field, std::string_view what) const {
   std::int64_t value = 0;
-  if (found.empty()) fail("the line ends where " + std::string(what) + " should stand");
-  if (!parseInteger(found, value)) fail(quoted(found) + " is not a whole number; want " + std::string(what));
+  if (field.empty()) fail("nothing stands where " + std::string(what) + " should");
+  if (!parseInteger(field, value)) fail(quotedWord(field) + " is not a whole number; want " + std::string(what));
   return value;
 }
+
+double TextScanner::number(std::string_view what) { return numberIn(word(), what); }
+
+std::int64_t TextScanner::integer(std::string_view what) { return integerIn(word(), what); }
 
 void TextScanner::fail(const std::string& problem) const {
   throw InvalidInput(file_ + ":" + std::to_string(line_number_), problem);

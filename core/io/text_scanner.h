@@ -3,11 +3,12 @@
 #include <cstdint>
 #include <string>
 #include <string_view>
+#include <vector>
 
 namespace shaped {
 
 /// A word of a file for an error text: shortened, and free of bytes that a terminal could not print.
-std::string quoted(std::string_view word);
+std::string quotedWord(std::string_view word);
 
 /// The shortest decimal text that reads back as exactly this number.
 std::string shortest(double value);
@@ -25,6 +26,9 @@ class TextScanner {
   /// What is left of the current line.
   std::string_view restOfLine() const { return line_; }
 
+  /// The rest of the line cut at every separator, blanks around each field removed; at least one field.
+  std::vector<std::string_view> fields(char separator);
+
   /// The next word of the line; empty at its end.
   std::string_view word();
   /// The next word as a number, NaN and infinity included. what: its role, for the error text.
@@ -32,6 +36,11 @@ class TextScanner {
   /// The next word as a whole number.
   std::int64_t integer(std::string_view what);
 
+  /// A field or word as a number; fails as number() does.
+  double numberIn(std::string_view field, std::string_view what) const;
+  std::int64_t integerIn(std::string_view field, std::string_view what) const;
+
+  std::int64_t lineNumber() const { return line_number_; }
   [[noreturn]] void fail(const std::string& problem) const;
 
  private:

@@ -36,7 +36,8 @@ double literalShellEnergy(const Topology& topology, const Vertices& undeformed, 
   for (Eigen::Index f = 0; f < topology.faces().rows(); ++f) {
     const Eigen::Matrix2d g = firstFundamentalForm(topology, undeformed, f);
     const Eigen::Matrix2d strain = g.inverse() * firstFundamentalForm(topology, deformed, f);
-    const double density = 0.5 * strain.trace() + 0.25 * strain.determinant() - 0.75 * std::log(strain.determinant()) - 1.25;
+    const double density =
+        0.5 * strain.trace() + 0.25 * strain.determinant() - 0.75 * std::log(strain.determinant()) - 1.25;
     energy += 0.5 * std::sqrt(g.determinant()) * density;
   }
   for (const auto& hinge : topology.hinges()) {
