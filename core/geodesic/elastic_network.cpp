@@ -5,7 +5,7 @@
 #include <algorithm>
 #include <cmath>
 #include <numeric>
-#include <optional>
+#include <memory>
 
 #include "core/geodesic/network_tree.h"
 #include "core/numerics/newton.h"
@@ -266,6 +266,7 @@ Solved<ElasticNetwork> relax(const ShellStructurePtr& structure, double bending,
   Outcome outcome;
   for (outcome.iterations = 0;; ++outcome.iterations) {
     outcome.residual = run.updateGradient();
+    if (options.on_iteration) options.on_iteration(outcome.iterations, outcome.residual);
     outcome.termination = Termination::kNumericalFailure;
     if (!std::isfinite(outcome.residual)) break;
     outcome.termination = Termination::kConverged;

@@ -1,7 +1,7 @@
 #pragma once
 
 #include <stop_token>
-#include <memory>
+#include <functional>
 #include <vector>
 
 #include "core/numerics/solved.h"
@@ -29,6 +29,7 @@ struct NetworkOptions {
   int max_iterations = 60;
   double tolerance = 1e-8;  ///< on the largest relative force imbalance over free nodes, > 0
   std::stop_token stop;
+  std::function<void(int iteration, double residual)> on_iteration;  ///< before each step, may be empty
 };
 
 /// Descends the network's energy in all free nodes at once by a truncated Newton method.

@@ -57,7 +57,7 @@ Solved<Path> GeodesicCalculus::relaxPath(Path path, const GeodesicOptions& optio
   ElasticNetwork network{std::move(path), std::vector<bool>(static_cast<std::size_t>(count), true), {}};
   network.free.front() = network.free.back() = false;
   for (std::int32_t k = 0; k + 1 < count; ++k) network.segments.push_back({k, k + 1, static_cast<double>(count - 1)});
-  auto solved = relax(structure_, bending_, std::move(network), {options.max_iterations, options.tolerance, options.stop});
+  auto solved = relax(structure_, bending_, std::move(network), {options.max_iterations, options.tolerance, options.stop, {}});
   return {std::move(solved.solution.nodes), solved};
 }
 

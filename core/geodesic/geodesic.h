@@ -46,6 +46,9 @@ class GeodesicCalculus {
   /// between nodes. t = -1 reflects b about a.
   Solved<Vertices> at(const Path& path, double t, const GeodesicOptions& options) const;
 
+  /// The shape between two neighbours that minimises (1 - t) W[a, s] + t W[s, b], equation (24); t in [0, 1].
+  Solved<Vertices> between(const Vertices& a, const Vertices& b, double t, const GeodesicOptions& options) const;
+
   /// K sum_k W[s_{k-1}, s_k], the squared distance of the ends when the path is a geodesic [m^2].
   double pathEnergy(const Path& path) const;
   /// W[s_{k-1}, s_k] per segment.
@@ -61,8 +64,6 @@ class GeodesicCalculus {
   Path startPath(const Vertices& a, const Vertices& b, int steps) const;
   Solved<Path> cascade(const Vertices& a, const Vertices& b, int steps, const GeodesicOptions& options) const;
   Solved<Path> relaxPath(Path path, const GeodesicOptions& options) const;
-  /// Elastic mean between neighbours, (24).
-  Solved<Vertices> between(const Vertices& a, const Vertices& b, double t, const GeodesicOptions& options) const;
   Vertices predict(const Vertices& previous, const Vertices& current) const;
 
   ShellStructurePtr structure_;

@@ -1,0 +1,242 @@
+#include "core/statistics/submanifold.h"
+
+#include <cmath>
+
+#include "core/mesh/alignment.h"
+#include "core/numerics/error.h"
+#include "core/numerics/simplex_qp.h"
+#include "core/shell/energy.h"
+#include "core/shell/shell_objective.h"
+
+namespace shaped {
+namespace {
+
+GeodesicOptions geodesicOptions(const SubmanifoldOptions& options) { return {100, options.shape_tolerance, options.stop}; }
+
+double shellDistance(const Topology& topology, const ShellMeasures& a, const ShellMeasures& b, double bending) {
+  return std::sqrt(std::max(shellEnergy(topology, a, b, bending), 0.0));
+}
+
+/// W,2[undeformed, deformed] with the pinned unknowns cleared.
+Eigen::VectorXd secondForce(const GeodesicCalculus& calculus, const ShellMeasures& undeformed, const Vertices& deformed,
+                            const ShellMeasures& deformed_measures, const Pins& pins) {
+  MeasureGradient gradient(calculus.topology());
+  addSecondGradient(calculus.topology(), undeformed, deformed_measures, calculus.bending(), 1, gradient);
+  Vertices force = Vertices::Zero(deformed.rows(), 3);
+  pullBackGradient(calculus.topology(), deformed, gradient, force);
+  Eigen::VectorXd result = flatten(force);
+  pins.clear(result.data());
+  return result;
+}
+
+}  // namespace
+
+Submanifold::Submanifold(std::shared_ptr<const GeodesicCalculus> calculus, std::shared_ptr<const ShellPga> pga)
+    : calculus_(std::move(calculus)), pga_(std::move(pga)), distances_(pga_->modes()), forces_(2 * pga_->modes()) {
+  const auto mean = measure(calculus_->topology(), pga_->mean);
+  const auto pins = gaugePins(pga_->mean);
+  for (const auto& variation : pga_->variations) {
+    const auto index = static_cast<Eigen::Index>(measures_.size());
+    measures_.push_back(measure(calculus_->topology(), variation));
+    forces_[index] = secondForce(*calculus_, measures_.back(), pga_->mean, mean, pins).norm() + forceFloor(mean);
+    if (index < pga_->modes())
+      distances_[index] = shellDistance(calculus_->topology(), mean, measures_.back(), calculus_->bending());
+  }
+}
+
+std::vector<std::size_t> Submanifold::vertexIndices(int modes) const {
+  const auto all = static_cast<std::size_t>(pga_->modes());
+  if (modes < 0 || modes > pga_->modes())
+    throw InvalidInput("modes", std::to_string(modes) + ", want 1 to " + std::to_string(all) + ", or 0 for all");
+  const auto used = modes == 0 ? all : static_cast<std::size_t>(modes);
+  std::vector<std::size_t> indices;
+  for (const std::size_t offset : {std::size_t{0}, all})
+    for (std::size_t j = 0; j < used; ++j) indices.push_back(offset + j);
+  return indices;
+}
+
+Solved<Vertices> Submanifold::average(const Eigen::VectorXd& alpha, const Vertices& start,
+                                      const SubmanifoldOptions& options) const {
+  ShellObjective objective(calculus_->structure(), calculus_->bending());
+  objective.setReferenceNorm(alpha.dot(forces_));
+  for (Eigen::Index j = 0; j < alpha.size(); ++j)
+    if (alpha[j] > 0) objective.addUndeformed(measures_[static_cast<std::size_t>(j)], alpha[j]);
+  return minimiseShell(objective, *calculus_->structure(), start, {60, options.shape_tolerance, options.stop});
+}
+
+/// The local projection (18) at one point: the derivative of q(alpha) by the implicit function theorem (27)-(29), and
+/// the Gauss-Newton model of W[s_loc, q(alpha)] that follows from it.
+struct Submanifold::LocalProjection {
+  Eigen::MatrixXd response;  ///< dq/dalpha, 3V x m
+  Eigen::VectorXd gradient;  ///< of W[s_loc, q(alpha)], m
+  Eigen::MatrixXd curvature; ///< m x m, positive semi-definite
+
+  LocalProjection(const Submanifold& owner, const ShellMeasures& target, const std::vector<std::size_t>& vertices,
+                  const Eigen::VectorXd& alpha, const Vertices& q) {
+    const auto& calculus = *owner.calculus_;
+    const auto& structure = *calculus.structure();
+    const auto pins = gaugePins(q);
+    const auto here = measure(calculus.topology(), q);
+    const auto m = static_cast<Eigen::Index>(vertices.size());
+
+    AverageEnergy energy(calculus.topology());
+    for (Eigen::Index j = 0; j < m; ++j)
+      energy.add(calculus.topology(), owner.measures_[vertices[static_cast<std::size_t>(j)]], calculus.bending(), alpha[j]);
+    SymmetricBlockMatrix hessian(structure.pattern());
+    CholeskyFactor factor(structure.analysis());
+    bool factorised = false;
+    for (const auto kind : {HessianKind::kExact, HessianKind::kProjected}) {
+      MeasureCurvature measures(calculus.topology(), kind);
+      energy.addCurvature(calculus.topology(), here, 1, measures);
+      hessian.setZero();
+      pullBackHessian(structure, q, measures, hessian);
+      factorised = factor.factorise(hessian, pins);
+      if (factorised) break;
+    }
+    response.setZero(q.size(), m);
+    gradient.setZero(m);
+    curvature.setZero(m, m);
+    if (!factorised) return;
+    for (Eigen::Index j = 0; j < m; ++j)
+      response.col(j) = -secondForce(calculus, owner.measures_[vertices[static_cast<std::size_t>(j)]], q, here, pins);
+    factor.solve(response.data(), response.data(), static_cast<int>(m));
+    gradient = response.transpose() * secondForce(calculus, target, q, here, pins);
+
+    MeasureCurvature measures(calculus.topology(), HessianKind::kProjected);
+    addSecondCurvature(calculus.topology(), target, here, calculus.bending(), 1, measures);
+    hessian.setZero();
+    pullBackHessian(structure, q, measures, hessian);
+    Eigen::MatrixXd image = Eigen::MatrixXd::Zero(response.rows(), m);
+    for (Eigen::Index j = 0; j < m; ++j) hessian.multiplyAdd(response.col(j).data(), image.col(j).data());
+    curvature = response.transpose() * image;
+    curvature = 0.5 * (curvature + curvature.transpose()).eval();
+  }
+
+  /// The step to the model's minimum on the simplex. Different weights can mean the same shape; the small proximal term
+  /// keeps the nearest ones and does not move the optimum.
+  Eigen::VectorXd step(const Eigen::VectorXd& alpha) const {
+    const auto m = alpha.size();
+    const double proximal = 1e-7 * curvature.trace() / static_cast<double>(m);
+    const Eigen::MatrixXd b = curvature + proximal * Eigen::MatrixXd::Identity(m, m);
+    return minimiseOnSimplex(b, gradient - b * alpha, alpha) - alpha;
+  }
+};
+
+Solved<SubmanifoldPoint> Submanifold::optimiseWeights(const ShellMeasures& target, const std::vector<std::size_t>& vertices,
+                                                      Eigen::VectorXd alpha, const SubmanifoldOptions& options,
+                                                      Vertices& q, double& energy) const {
+  const auto& topology = calculus_->topology();
+  const double size = shellEnergy(topology, measure(topology, pga_->mean), target, calculus_->bending());
+  const auto spread = [&](const Eigen::VectorXd& used) {
+    Eigen::VectorXd all = Eigen::VectorXd::Zero(forces_.size());
+    for (std::size_t j = 0; j < vertices.size(); ++j) all[static_cast<Eigen::Index>(vertices[j])] = used[static_cast<Eigen::Index>(j)];
+    return all;
+  };
+  const auto evaluate = [&](const Vertices& shape) {
+    return shellEnergy(topology, target, measure(topology, shape), calculus_->bending());
+  };
+  Outcome outcome;
+  auto solved = average(spread(alpha), q, options);
+  q = std::move(solved.solution);
+  energy = evaluate(q);
+  for (outcome.iterations = 0;; ++outcome.iterations) {
+    const LocalProjection model(*this, target, vertices, alpha, q);
+    const Eigen::VectorXd step = model.step(alpha);
+    const double slope = model.gradient.dot(step);
+    outcome.residual = std::sqrt(std::max(-slope, 0.0) / std::max(size, 1e-300));
+    outcome.termination = Termination::kConverged;
+    if (outcome.residual <= options.tolerance) break;
+    outcome.termination = Termination::kIterationLimit;
+    if (outcome.iterations >= options.max_iterations) break;
+    outcome.termination = Termination::kCancelled;
+    if (options.stop.stop_requested()) break;
+    double length = 1;
+    for (; length > 1e-4; length *= 0.5) {
+      auto trial = average(spread(alpha + length * step), q + unflatten(length * (model.response * step)), options);
+      const double trial_energy = evaluate(trial.solution);
+      if (!(trial_energy <= energy + 1e-4 * length * slope)) continue;
+      alpha = (alpha + length * step).cwiseMax(0);
+      alpha /= alpha.sum();
+      q = std::move(trial.solution);
+      energy = trial_energy;
+      break;
+    }
+    outcome.termination = Termination::kStalled;
+    if (length <= 1e-4) break;
+  }
+  return {SubmanifoldPoint{spread(alpha), 1}, outcome};
+}
+
+Solved<SubmanifoldProjection> Submanifold::project(const Vertices& shape, const SubmanifoldOptions& options,
+                                                   const SubmanifoldProjection* warm) const {
+  const auto vertices = vertexIndices(options.modes);
+  const auto geodesic_options = geodesicOptions(options);
+  auto path = calculus_->interpolate(pga_->mean, shape, pga_->path_steps, geodesic_options, warm ? warm->geodesic : Path{});
+  Outcome outcome = path;
+  SubmanifoldProjection result;
+  const double distance = calculus_->distance(path.solution);
+  const double nearest = distances_.head(static_cast<Eigen::Index>(vertices.size() / 2)).minCoeff();
+  result.point.scale = distance > 0 ? std::min(1.0, options.kappa * nearest / distance) : 1.0;
+  const auto local = calculus_->at(path.solution, result.point.scale, geodesic_options);
+  outcome += local;
+
+  Eigen::VectorXd start(static_cast<Eigen::Index>(vertices.size()));
+  for (std::size_t j = 0; j < vertices.size(); ++j)
+    start[static_cast<Eigen::Index>(j)] = warm ? warm->point.alpha[static_cast<Eigen::Index>(vertices[j])] : 1.0;
+  start /= start.sum();
+  result.local = warm ? warm->local : pga_->mean;
+  const auto weights = optimiseWeights(measure(calculus_->topology(), local.solution), vertices, start, options,
+                                       result.local, result.local_energy);
+  outcome += weights;
+  result.point.alpha = weights.solution.alpha;
+  auto scaled = rescale(result.local, 1 / result.point.scale, options);
+  outcome += scaled;
+  result.shape = std::move(scaled.solution);
+  result.geodesic = std::move(path.solution);
+  return {std::move(result), outcome};
+}
+
+Solved<Vertices> Submanifold::rescale(const Vertices& local, double factor, const SubmanifoldOptions& options) const {
+  // I(mean, local, factor) with about K steps in all: first scaled by a factor in [1/2, 2) so that doublings and then
+  // K - 1 equal steps arrive exactly; each doubling reflects the mean at the shape reached.
+  const auto geodesic_options = geodesicOptions(options);
+  const double steps = pga_->path_steps;
+  const int doublings = factor > steps ? static_cast<int>(std::floor(std::log2(factor / steps))) : 0;
+  const double marches = factor > steps ? steps : std::max(1.0, std::ceil(factor - 1e-12));
+  const double first = factor / (marches * std::pow(2.0, doublings));
+  auto scaled = calculus_->at({pga_->mean, local}, first, geodesic_options);
+  Outcome outcome = scaled;
+  Vertices here = std::move(scaled.solution), before = pga_->mean;
+  const auto advance = [&](const Vertices& previous) {
+    auto next = calculus_->extrapolate(previous, here, geodesic_options);
+    outcome += next;
+    before = std::move(here);
+    here = std::move(next.solution);
+  };
+  for (int k = 0; k < doublings && outcome.converged(); ++k) advance(pga_->mean);
+  before = pga_->mean;
+  for (int k = 1; k < static_cast<int>(marches) && outcome.converged(); ++k) advance(Vertices(before));
+  return {std::move(here), outcome};
+}
+
+Solved<Vertices> Submanifold::shapeOf(const SubmanifoldPoint& point, const SubmanifoldOptions& options) const {
+  if (point.alpha.size() != forces_.size())
+    throw InvalidInput("alpha", "has " + std::to_string(point.alpha.size()) + " entries, want " + std::to_string(forces_.size()));
+  for (Eigen::Index j = 0; j < point.alpha.size(); ++j)
+    if (!(point.alpha[j] >= 0)) throw InvalidInput("alpha[" + std::to_string(j) + "]", "is negative or not a number");
+  if (!(std::abs(point.alpha.sum() - 1) < 1e-6))
+    throw InvalidInput("alpha", "sums to " + std::to_string(point.alpha.sum()) + ", want 1");
+  if (!(point.scale > 0) || !std::isfinite(point.scale)) throw InvalidInput("scale", "must be a positive number");
+  const auto local = average(point.alpha, pga_->mean, options);
+  auto scaled = rescale(local.solution, 1 / point.scale, options);
+  Outcome outcome = local;
+  outcome += scaled;
+  return {std::move(scaled.solution), outcome};
+}
+
+Eigen::VectorXd Submanifold::tangentCoordinates(const SubmanifoldPoint& point) const {
+  const auto j = distances_.size();
+  return (point.alpha.head(j) - point.alpha.tail(j)).cwiseProduct(distances_) / point.scale;
+}
+
+}  // namespace shaped

@@ -1,0 +1,68 @@
+#pragma once
+
+#include "core/statistics/principal_variations.h"
+
+namespace shaped {
+
+/// A point of the submanifold M_J, (15)-(16) of [HZRS18]: I(mean, q(alpha), 1 / scale).
+struct SubmanifoldPoint {
+  Eigen::VectorXd alpha;  ///< 2J weights of p_1 .. p_J, p_-1 .. p_-J; >= 0, sum 1
+  double scale = 1;       ///< rho of (17), in (0, 1]
+};
+
+/// Projection of one shape, with what a similar shape's projection can start from.
+struct SubmanifoldProjection {
+  SubmanifoldPoint point;
+  Vertices shape;         ///< P[s] (20), in no particular position
+  Vertices local;         ///< P_loc[s_loc] (18)
+  Path geodesic;          ///< from the mean to s
+  double local_energy;    ///< W[s_loc, P_loc[s_loc]] [m^2]
+};
+
+struct SubmanifoldOptions {
+  int modes = 0;             ///< J to use, 1 .. model's; 0 = all
+  double kappa = 0.5;        ///< of (17), in (0, 1)
+  int max_iterations = 50;   ///< of the weights' optimisation, >= 1
+  double tolerance = 1e-6;   ///< of the weights: norm of the projected gradient over that of the forces, > 0
+  double shape_tolerance = 1e-8;  ///< of every inner shape solve, > 0
+  std::stop_token stop;
+};
+
+/// The submanifold "spanned" by principal variations, with its projection and its inverse. Const and safe to share.
+class Submanifold {
+ public:
+  Submanifold(std::shared_ptr<const GeodesicCalculus> calculus, std::shared_ptr<const ShellPga> pga);
+
+  const ShellPga& pga() const { return *pga_; }
+  const GeodesicCalculus& calculus() const { return *calculus_; }
+
+  /// q(alpha), the minimiser of (26), started from `start`.
+  Solved<Vertices> average(const Eigen::VectorXd& alpha, const Vertices& start, const SubmanifoldOptions& options) const;
+
+  /// (17)-(20): scaling, local projection, rescaling. warm: the projection of a similar shape, or null.
+  Solved<SubmanifoldProjection> project(const Vertices& shape, const SubmanifoldOptions& options,
+                                        const SubmanifoldProjection* warm = nullptr) const;
+
+  /// The shape of a point, (16). Throws InvalidInput naming "alpha" or "scale" when the point is not one of M_J.
+  Solved<Vertices> shapeOf(const SubmanifoldPoint& point, const SubmanifoldOptions& options) const;
+
+  /// Coordinates in the principal components [m]: y_j = (alpha_j - alpha_-j) dist(mean, p_j) / scale, the logarithm of
+  /// the point to first order. Their variance over the training shapes is the eigenvalue.
+  Eigen::VectorXd tangentCoordinates(const SubmanifoldPoint& point) const;
+
+ private:
+  struct LocalProjection;
+  std::vector<std::size_t> vertexIndices(int modes) const;
+  Solved<SubmanifoldPoint> optimiseWeights(const ShellMeasures& target, const std::vector<std::size_t>& vertices,
+                                           Eigen::VectorXd start, const SubmanifoldOptions& options, Vertices& q,
+                                           double& energy) const;
+  Solved<Vertices> rescale(const Vertices& local, double factor, const SubmanifoldOptions& options) const;
+
+  std::shared_ptr<const GeodesicCalculus> calculus_;
+  std::shared_ptr<const ShellPga> pga_;
+  std::vector<ShellMeasures> measures_;  ///< of the variations
+  Eigen::VectorXd distances_;            ///< sqrt(W[mean, p_j]), J entries [m]
+  Eigen::VectorXd forces_;               ///< |W,2[p_j, mean]|, 2J entries: reference for balances
+};
+
+}  // namespace shaped
