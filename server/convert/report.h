@@ -1,0 +1,12 @@
+#pragma once
+
+#include "core/numerics/solved.h"
+#include "shaped/v1/report.pb.h"
+
+namespace shaped::server {
+
+v1::Termination toProto(Termination termination);
+/// seconds: wall-clock time of the work.
+void toProto(const Outcome& outcome, double seconds, v1::SolverReport& report);
+
+}  // namespace shaped::server

@@ -1,0 +1,188 @@
+#include "server/datasets/dataset_store.h"
+
+#include <nlohmann/json.hpp>
+
+#include "core/io/file.h"
+#include "core/io/npy.h"
+#include "core/numerics/error.h"
+#include "server/datasets/name.h"
+#include "server/errors/errors.h"
+
+namespace shaped::server {
+namespace {
+
+namespace fs = std::filesystem;
+
+constexpr char kFrames[] = "frames.npy", kFaces[] = "faces.npy", kInfo[] = "dataset.json";
+constexpr char kScratchPrefix[] = ".scratch-";  // no dataset's name begins with a dot
+
+void writeInfo(const fs::path& folder, const DatasetInfo& info) {
+  const nlohmann::json document{
+      {"name", info.name},
+      {"frames", info.frames},
+      {"vertices", info.vertex_count},
+      {"faces", info.face_count},
+      {"topology_id", info.topology_id},
+      {"created", std::chrono::duration_cast<std::chrono::seconds>(info.created.time_since_epoch()).count()}};
+  writeFile(folder / kInfo, document.dump(2) + "\n");
+}
+
+DatasetInfo readInfo(const fs::path& folder) {
+  const auto document = nlohmann::json::parse(readFile(folder / kInfo));
+  return {document.at("name"),
+          document.at("frames"),
+          document.at("vertices"),
+          document.at("faces"),
+          document.at("topology_id"),
+          std::chrono::system_clock::time_point(std::chrono::seconds(document.at("created").get<std::int64_t>()))};
+}
+
+void writeFaces(const fs::path& folder, const Faces& faces) {
+  writeNpy(folder / kFaces, {faces.rows(), 3},
+           std::span<const std::int32_t>(faces.data(), static_cast<std::size_t>(faces.size())));
+}
+
+Faces readFaces(const fs::path& folder) {
+  constexpr std::int64_t any_by_three[] = {-1, 3};
+  const auto array = readNpy(folder / kFaces, any_by_three);
+  using Stored = Eigen::Matrix<double, Eigen::Dynamic, 3, Eigen::RowMajor>;
+  return Eigen::Map<const Stored>(array.values.data(), array.shape[0], 3).cast<std::int32_t>();
+}
+
+bool sameContent(const fs::path& one, const fs::path& other) {
+  for (const char* file : {kFaces, kFrames}) {
+    if (fs::file_size(one / file) != fs::file_size(other / file)) return false;
+    if (readFile(one / file) != readFile(other / file)) return false;
+  }
+  return true;
+}
+
+std::string framePath(std::int64_t index, const std::string& label) {
+  return "frames[" + std::to_string(index) + "]" + (label.empty() ? "" : " (" + label + ")");
+}
+
+}  // namespace
+
+DatasetUpload::DatasetUpload(DatasetStore& store, std::string name, TopologyPtr topology, std::int64_t frames,
+                             fs::path folder)
+    : store_(store),
+      name_(std::move(name)),
+      topology_(std::move(topology)),
+      frames_(frames),
+      folder_(std::move(folder)) {
+  fs::create_directory(folder_);
+  writeFaces(folder_, topology_->faces());
+  writer_.emplace(folder_ / kFrames);
+}
+
+DatasetUpload::~DatasetUpload() {
+  writer_.reset();
+  std::error_code ignored;  // what stays behind is removed at the next start
+  fs::remove_all(folder_, ignored);
+}
+
+void DatasetUpload::append(const Vertices& shape, const std::string& label) {
+  const auto index = writer_->frameCount();
+  const auto field = framePath(index, label);
+  if (index >= frames_)
+    throw InvalidInput(field, "is one too many: the header announced " + std::to_string(frames_) + " frames");
+  requireValidShape(*topology_, shape, field);
+  writer_->append(shape);
+}
+
+DatasetInfo DatasetUpload::commit() {
+  if (writer_->frameCount() != frames_)
+    throw InvalidInput("frames", "the header announced " + std::to_string(frames_) + ", " +
+                                     std::to_string(writer_->frameCount()) + " came");
+  writer_->close();
+  return store_.publish(*this);
+}
+
+DatasetStore::DatasetStore(fs::path root) : root_(std::move(root)) {
+  fs::create_directories(root_);
+  for (const auto& entry : fs::directory_iterator(root_)) {
+    const auto name = entry.path().filename().string();
+    if (name.starts_with(kScratchPrefix)) {
+      fs::remove_all(entry.path());
+      continue;
+    }
+    try {
+      datasets_.emplace(name, readInfo(entry.path()));
+    } catch (const std::exception&) {
+      // Not a dataset of ours: left alone, not served.
+    }
+  }
+}
+
+std::unique_ptr<DatasetUpload> DatasetStore::begin(const std::string& name, std::int32_t vertex_count, Faces faces,
+                                                   std::int64_t frames) {
+  requireName(name, "name");
+  if (frames < 1) throw InvalidInput("frames", "= " + std::to_string(frames) + ", want >= 1");
+  auto topology = std::make_shared<const Topology>(vertex_count, std::move(faces));
+  requireOneComponent(*topology, "faces");
+  return std::unique_ptr<DatasetUpload>(new DatasetUpload(*this, name, std::move(topology), frames, scratchFolder()));
+}
+
+DatasetInfo DatasetStore::publish(const DatasetUpload& upload) {
+  const auto& topology = *upload.topology_;
+  const DatasetInfo info{
+      upload.name_,           upload.frames_,
+      topology.vertexCount(), topology.faces().rows(),
+      topology.id(),          std::chrono::floor<std::chrono::seconds>(std::chrono::system_clock::now())};
+  writeInfo(upload.folder_, info);
+  const std::scoped_lock lock(mutex_);
+  if (const auto found = datasets_.find(info.name); found != datasets_.end()) {
+    if (sameContent(root_ / info.name, upload.folder_)) return found->second;
+    throw AlreadyExists("dataset \"" + info.name + "\" exists and holds other shapes; delete it or take another name");
+  }
+  fs::rename(upload.folder_, root_ / info.name);
+  datasets_.emplace(info.name, info);
+  return info;
+}
+
+std::vector<DatasetInfo> DatasetStore::list() const {
+  const std::scoped_lock lock(mutex_);
+  std::vector<DatasetInfo> result;
+  for (const auto& [name, info] : datasets_) result.push_back(info);
+  return result;
+}
+
+DatasetInfo DatasetStore::get(const std::string& name) const {
+  const std::scoped_lock lock(mutex_);
+  const auto found = datasets_.find(name);
+  if (found == datasets_.end()) throw NotFound("there is no dataset \"" + name + "\"");
+  return found->second;
+}
+
+Dataset DatasetStore::load(const std::string& name) const {
+  const auto info = get(name);
+  const auto folder = root_ / name;
+  try {
+    auto topology = std::make_shared<const Topology>(info.vertex_count, readFaces(folder));
+    auto shapes = readFrames(folder / kFrames);
+    if (topology->id() != info.topology_id || std::ssize(shapes) != info.frames)
+      throw Corrupted("dataset \"" + name + "\" does not hold what was uploaded; delete it and upload it again");
+    for (const auto& shape : shapes) requireValidShape(*topology, shape, name);
+    return {std::move(topology), std::move(shapes)};
+  } catch (const InvalidInput& error) {
+    get(name);  // deleted while we read it: NotFound says so
+    throw Corrupted("dataset \"" + name + "\" cannot be read: " + error.what());
+  }
+}
+
+void DatasetStore::remove(const std::string& name) {
+  const auto doomed = scratchFolder();
+  {
+    const std::scoped_lock lock(mutex_);
+    if (datasets_.erase(name) == 0) throw NotFound("there is no dataset \"" + name + "\"");
+    fs::rename(root_ / name, doomed);
+  }
+  fs::remove_all(doomed);
+}
+
+fs::path DatasetStore::scratchFolder() {
+  const std::scoped_lock lock(mutex_);
+  return root_ / (kScratchPrefix + std::to_string(next_scratch_++));
+}
+
+}  // namespace shaped::server

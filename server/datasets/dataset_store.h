@@ -1,0 +1,94 @@
+#pragma once
+
+#include <chrono>
+#include <filesystem>
+#include <map>
+#include <memory>
+#include <mutex>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "core/io/frames.h"
+#include "core/mesh/topology.h"
+
+namespace shaped::server {
+
+/// What is known of a dataset without reading its frames.
+struct DatasetInfo {
+  std::string name;
+  std::int64_t frames = 0;
+  std::int32_t vertex_count = 0;
+  std::int64_t face_count = 0;
+  std::string topology_id;
+  std::chrono::system_clock::time_point created;
+};
+
+/// Shapes that share a connectivity.
+struct Dataset {
+  TopologyPtr topology;
+  std::vector<Vertices> shapes;  ///< V x 3 each, metres
+};
+
+class DatasetStore;
+
+/// A dataset on its way in: frames are checked and written as they come. Destroyed before commit(), it leaves nothing.
+class DatasetUpload {
+ public:
+  ~DatasetUpload();
+  DatasetUpload(const DatasetUpload&) = delete;
+  DatasetUpload& operator=(const DatasetUpload&) = delete;
+
+  const Topology& topology() const { return *topology_; }
+  /// label: what errors call the frame beside its index. Throws InvalidInput naming frame and vertex or face when the
+  /// shape is faulty or one too many; FileError when the disk fails.
+  void append(const Vertices& shape, const std::string& label);
+  /// Publishes the dataset. Throws InvalidInput when frames are missing, AlreadyExists when the name holds other
+  /// shapes, FileError when the disk fails. Call once, last.
+  DatasetInfo commit();
+
+ private:
+  friend class DatasetStore;
+  DatasetUpload(DatasetStore& store, std::string name, TopologyPtr topology, std::int64_t frames,
+                std::filesystem::path folder);
+
+  DatasetStore& store_;
+  const std::string name_;
+  const TopologyPtr topology_;
+  const std::int64_t frames_;
+  const std::filesystem::path folder_;
+  std::optional<FrameWriter> writer_;
+};
+
+/// Datasets under <root>/<name>/: frames.npy (n x V x 3 floats), faces.npy (F x 3), dataset.json. They appear and go by
+/// one rename each, so a crash leaves whole datasets and rubbish that the next start removes. Safe from any thread.
+class DatasetStore {
+ public:
+  /// Creates the folder if need be and indexes what is there. Throws FileError when the disk fails.
+  explicit DatasetStore(std::filesystem::path root);
+
+  /// frames >= 1 announced frames. Throws InvalidInput for a bad name or count, or faces that are no one-component
+  /// two-manifold (field "faces[i]").
+  std::unique_ptr<DatasetUpload> begin(const std::string& name, std::int32_t vertex_count, Faces faces,
+                                       std::int64_t frames);
+  /// By name.
+  std::vector<DatasetInfo> list() const;
+  /// Throws NotFound.
+  DatasetInfo get(const std::string& name) const;
+  /// Reads a dataset. Throws NotFound; Corrupted when its files do not hold what was uploaded.
+  Dataset load(const std::string& name) const;
+  /// Throws NotFound; FileError when the disk fails.
+  void remove(const std::string& name);
+
+ private:
+  friend class DatasetUpload;
+  std::filesystem::path scratchFolder();
+  DatasetInfo publish(const DatasetUpload& upload);
+
+  const std::filesystem::path root_;
+  mutable std::mutex mutex_;
+  std::map<std::string, DatasetInfo> datasets_;
+  std::uint64_t next_scratch_ = 0;
+};
+
+}  // namespace shaped::server

@@ -1,0 +1,36 @@
+#pragma once
+
+#include <stdexcept>
+#include <string>
+
+// Why a request cannot be served, where InvalidInput (the request itself is wrong) does not fit. Each maps to one gRPC
+// status, in server/errors/status.h; a thrower names what it is about.
+namespace shaped::server {
+
+/// No such model, version, dataset or job.
+class NotFound : public std::runtime_error {
+  using std::runtime_error::runtime_error;
+};
+
+/// The name is taken.
+class AlreadyExists : public std::runtime_error {
+  using std::runtime_error::runtime_error;
+};
+
+/// Full for now; the same request may succeed later.
+class Busy : public std::runtime_error {
+  using std::runtime_error::runtime_error;
+};
+
+/// A file of the store does not hold what was written to it.
+class Corrupted : public std::runtime_error {
+  using std::runtime_error::runtime_error;
+};
+
+/// The stop token fired before there was an answer; the call knows whether its client or its deadline did it.
+class Stopped : public std::runtime_error {
+ public:
+  Stopped() : std::runtime_error("stopped before there was an answer") {}
+};
+
+}  // namespace shaped::server

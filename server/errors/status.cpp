@@ -1,0 +1,108 @@
+#include "server/errors/status.h"
+
+#include <new>
+#include <system_error>
+
+#include "core/io/file_error.h"
+#include "core/numerics/error.h"
+#include "server/errors/errors.h"
+
+namespace shaped::server {
+namespace {
+
+using grpc::Status;
+
+// FileError carries the system's reason as text only.
+bool saysDiskFull(const std::string& text) {
+  for (const int reason : {ENOSPC, EDQUOT})
+    if (text.find(std::generic_category().message(reason)) != std::string::npos) return true;
+  return false;
+}
+
+Status fileStatus(const std::string& text) {
+  if (saysDiskFull(text)) return {grpc::RESOURCE_EXHAUSTED, text + "; free space in the store and try again"};
+  return {grpc::INTERNAL, text};
+}
+
+// gRPC cuts what exceeds its header limit of 8 KiB together with the whole status.
+std::string shortened(std::string text) {
+  constexpr std::size_t longest = 2000;
+  if (text.size() > longest) text = text.substr(0, longest) + " ...";
+  return text;
+}
+
+Status unboundedStatusOf(const std::exception_ptr& error, StopReason stopped) {
+  try {
+    std::rethrow_exception(error);
+  } catch (const Stopped&) {
+    return stoppedStatus(stopped);
+  } catch (const InvalidInput& problem) {
+    return {grpc::INVALID_ARGUMENT, problem.what()};
+  } catch (const NotFound& problem) {
+    return {grpc::NOT_FOUND, problem.what()};
+  } catch (const AlreadyExists& problem) {
+    return {grpc::ALREADY_EXISTS, problem.what()};
+  } catch (const Busy& problem) {
+    return {grpc::RESOURCE_EXHAUSTED, problem.what()};
+  } catch (const Corrupted& problem) {
+    return {grpc::DATA_LOSS, problem.what()};
+  } catch (const FileError& problem) {
+    return fileStatus(problem.what());
+  } catch (const std::system_error& problem) {
+    return fileStatus(problem.what());
+  } catch (const std::bad_alloc&) {
+    return {grpc::RESOURCE_EXHAUSTED, "not enough memory for this request"};
+  } catch (const std::exception& problem) {
+    return {grpc::INTERNAL, problem.what()};
+  } catch (...) {
+    return {grpc::INTERNAL, "an unknown error"};
+  }
+}
+
+}  // namespace
+
+Status statusOf(const std::exception_ptr& error, StopReason stopped) {
+  const auto status = unboundedStatusOf(error, stopped);
+  return {status.error_code(), shortened(status.error_message())};
+}
+
+Status stoppedStatus(StopReason reason) {
+  if (reason == StopReason::kDeadline)
+    return {grpc::DEADLINE_EXCEEDED, "the deadline passed before there was an answer"};
+  return {grpc::CANCELLED, "cancelled by the client"};
+}
+
+std::string nameOf(grpc::StatusCode code) {
+  switch (code) {
+    case grpc::OK:
+      return "OK";
+    case grpc::CANCELLED:
+      return "CANCELLED";
+    case grpc::INVALID_ARGUMENT:
+      return "INVALID_ARGUMENT";
+    case grpc::DEADLINE_EXCEEDED:
+      return "DEADLINE_EXCEEDED";
+    case grpc::NOT_FOUND:
+      return "NOT_FOUND";
+    case grpc::ALREADY_EXISTS:
+      return "ALREADY_EXISTS";
+    case grpc::RESOURCE_EXHAUSTED:
+      return "RESOURCE_EXHAUSTED";
+    case grpc::FAILED_PRECONDITION:
+      return "FAILED_PRECONDITION";
+    case grpc::UNAVAILABLE:
+      return "UNAVAILABLE";
+    case grpc::DATA_LOSS:
+      return "DATA_LOSS";
+    case grpc::INTERNAL:
+      return "INTERNAL";
+    default:
+      return "UNKNOWN";
+  }
+}
+
+bool serversFault(grpc::StatusCode code) {
+  return code == grpc::INTERNAL || code == grpc::DATA_LOSS || code == grpc::UNKNOWN;
+}
+
+}  // namespace shaped::server

@@ -1,0 +1,28 @@
+#pragma once
+
+#include <grpcpp/support/status.h>
+
+#include <exception>
+#include <string>
+
+#include "server/scheduling/stopper.h"
+
+namespace shaped::server {
+
+/// The status for an exception that ended a request; the one place where this is decided.
+///   InvalidInput -> INVALID_ARGUMENT (the text names the field)   NotFound -> NOT_FOUND   AlreadyExists ->
+///   ALREADY_EXISTS Busy -> RESOURCE_EXHAUSTED   Corrupted -> DATA_LOSS   Stopped -> see stoppedStatus FileError and
+///   system errors -> RESOURCE_EXHAUSTED when the disk is full, else INTERNAL std::bad_alloc -> RESOURCE_EXHAUSTED
+///   anything else -> INTERNAL
+grpc::Status statusOf(const std::exception_ptr& error, StopReason stopped);
+
+/// The client went away: CANCELLED; time is up: DEADLINE_EXCEEDED.
+grpc::Status stoppedStatus(StopReason reason);
+
+/// "INVALID_ARGUMENT" and so on.
+std::string nameOf(grpc::StatusCode code);
+
+/// Whether an operator should look: the server, not the client, is at fault.
+bool serversFault(grpc::StatusCode code);
+
+}  // namespace shaped::server

@@ -1,0 +1,79 @@
+#include "server/rpc/call.h"
+
+#include <algorithm>
+
+#include "server/errors/errors.h"
+#include "server/telemetry/call_log.h"
+
+namespace shaped::server {
+namespace {
+
+std::uint64_t nextRequestId() {
+  static std::atomic<std::uint64_t> last{0};
+  return ++last;
+}
+
+double secondsSince(std::chrono::steady_clock::time_point begin) {
+  return std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count();
+}
+
+}  // namespace
+
+Call::Call(Runtime& runtime, grpc::CallbackServerContext& context, std::string method)
+    : runtime_(runtime),
+      context_(context),
+      id_(nextRequestId()),
+      method_(std::move(method)),
+      arrival_(std::chrono::steady_clock::now()),
+      work_begin_(arrival_) {}
+
+void Call::throwIfStopped() const {
+  if (stopped()) throw Stopped();
+}
+
+void Call::setModel(const std::string& name, std::uint64_t version) {
+  const std::scoped_lock lock(model_mutex_);
+  model_ = name + "@" + std::to_string(version);
+}
+
+double Call::workSeconds() const { return secondsSince(work_begin_); }
+
+grpc::Status Call::guarded(const std::function<void()>& work) {
+  work_begin_ = std::chrono::steady_clock::now();
+  try {
+    throwIfStopped();
+    work();
+    return grpc::Status::OK;
+  } catch (...) {
+    return statusOf(std::current_exception(), stopper_.reason());
+  }
+}
+
+void Call::stop(StopReason reason) {
+  // When the client's deadline passes, gRPC reports a cancellation.
+  const bool late = context_.deadline() <= DeadlineTimer::Clock::now();
+  stopper_.stop(late ? StopReason::kDeadline : reason);
+}
+
+grpc::Status Call::refusal(const Decision& decision) {
+  context_.AddTrailingMetadata("grpc-retry-pushback-ms", std::to_string(decision.retry_after.count()));
+  return {grpc::RESOURCE_EXHAUSTED, decision.reason};
+}
+
+DeadlineTimer::Clock::time_point Call::deadline() const {
+  const auto cap = std::chrono::duration_cast<DeadlineTimer::Clock::duration>(runtime_.longest_call);
+  return std::min(context_.deadline(), DeadlineTimer::Clock::now() + cap);
+}
+
+bool Call::finishOnce(const grpc::Status& status) {
+  if (finished_.exchange(true)) return false;
+  CallRecord record{id_, method_, {}, nameOf(status.error_code()), status.error_message(), secondsSince(arrival_)};
+  {
+    const std::scoped_lock lock(model_mutex_);
+    record.model = model_;
+  }
+  logCall(record, serversFault(status.error_code()));
+  return true;
+}
+
+}  // namespace shaped::server

@@ -1,0 +1,82 @@
+#include "server/rpc/datasets_service.h"
+
+#include "core/numerics/error.h"
+#include "server/convert/dataset.h"
+#include "server/convert/mesh.h"
+#include "server/rpc/incoming_stream_call.h"
+#include "server/rpc/unary_call.h"
+
+namespace shaped::server {
+namespace {
+
+class UploadHandler final : public StreamHandler<v1::UploadDatasetRequest, v1::UploadDatasetResponse> {
+ public:
+  explicit UploadHandler(DatasetStore& store) : store_(store) {}
+
+  bool message(const v1::UploadDatasetRequest& request, v1::UploadDatasetResponse&, Call&) override {
+    if (request.has_header())
+      begin(request.header());
+    else if (request.has_frame())
+      append(request.frame());
+    else
+      throw InvalidInput("part", "is neither header nor frame");
+    return false;
+  }
+
+  void end(v1::UploadDatasetResponse& response, Call&) override {
+    if (!upload_) throw InvalidInput("header", "is missing: the stream was empty");
+    toProto(upload_->commit(), *response.mutable_dataset());
+    upload_.reset();
+  }
+
+ private:
+  void begin(const v1::UploadDatasetRequest::Header& header) {
+    if (upload_) throw InvalidInput("header", "came a second time");
+    auto faces = facesFromProto(header.faces(), header.vertex_count(), "header.faces");
+    upload_ = store_.begin(header.name(), static_cast<std::int32_t>(header.vertex_count()), std::move(faces),
+                           header.frames());
+  }
+
+  void append(const v1::UploadDatasetRequest::Frame& frame) {
+    if (!upload_) throw InvalidInput("header", "is missing: the first message must be it");
+    const auto label = frame.label().empty() ? "" : " (" + frame.label() + ")";
+    const auto field = "frames[" + std::to_string(frame_count_++) + "]" + label;
+    const auto vertex_count = upload_->topology().vertexCount();
+    if (frame.positions_size() != 3 * vertex_count)
+      throw InvalidInput(field, "has " + std::to_string(frame.positions_size()) + " coordinates, want " +
+                                    std::to_string(3 * vertex_count) + " for " + std::to_string(vertex_count) +
+                                    " vertices");
+    upload_->append(pointsFromProto(frame.positions(), vertex_count, field), frame.label());
+  }
+
+  DatasetStore& store_;
+  std::unique_ptr<DatasetUpload> upload_;
+  std::int64_t frame_count_ = 0;
+};
+
+}  // namespace
+
+grpc::ServerReadReactor<v1::UploadDatasetRequest>* DatasetsService::Upload(grpc::CallbackServerContext* context,
+                                                                           v1::UploadDatasetResponse* response) {
+  return startClientStream<v1::UploadDatasetRequest, v1::UploadDatasetResponse>(
+      runtime_, runtime_.light, "Datasets.Upload", context, response, std::make_unique<UploadHandler>(store_));
+}
+
+grpc::ServerUnaryReactor* DatasetsService::List(grpc::CallbackServerContext* context,
+                                                const v1::ListDatasetsRequest* request,
+                                                v1::ListDatasetsResponse* response) {
+  return startUnary<v1::ListDatasetsRequest, v1::ListDatasetsResponse>(
+      runtime_, runtime_.light, "Datasets.List", context, request, response, [this](const auto&, auto& answer, Call&) {
+        for (const auto& info : store_.list()) toProto(info, *answer.add_datasets());
+      });
+}
+
+grpc::ServerUnaryReactor* DatasetsService::Delete(grpc::CallbackServerContext* context,
+                                                  const v1::DeleteDatasetRequest* request,
+                                                  v1::DeleteDatasetResponse* response) {
+  return startUnary<v1::DeleteDatasetRequest, v1::DeleteDatasetResponse>(
+      runtime_, runtime_.light, "Datasets.Delete", context, request, response,
+      [this](const auto& wanted, auto&, Call&) { store_.remove(wanted.name()); });
+}
+
+}  // namespace shaped::server

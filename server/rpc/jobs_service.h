@@ -1,0 +1,38 @@
+#pragma once
+
+#include <functional>
+
+#include "server/jobs/job_registry.h"
+#include "server/jobs/job_runner.h"
+#include "server/rpc/call.h"
+#include "shaped/v1/jobs.grpc.pb.h"
+
+namespace shaped::server {
+
+class JobsService final : public v1::Jobs::CallbackService {
+ public:
+  /// Checks the request and starts its job; throws as statusOf says.
+  using StartTraining = std::function<JobRecord(const v1::TrainRequest&)>;
+
+  JobsService(Runtime& runtime, JobRegistry& registry, JobRunner& runner, StartTraining start_training)
+      : runtime_(runtime), registry_(registry), runner_(runner), start_training_(std::move(start_training)) {}
+
+  grpc::ServerUnaryReactor* Train(grpc::CallbackServerContext* context, const v1::TrainRequest* request,
+                                  v1::TrainResponse* response) override;
+  grpc::ServerUnaryReactor* Get(grpc::CallbackServerContext* context, const v1::GetJobRequest* request,
+                                v1::GetJobResponse* response) override;
+  grpc::ServerUnaryReactor* List(grpc::CallbackServerContext* context, const v1::ListJobsRequest* request,
+                                 v1::ListJobsResponse* response) override;
+  grpc::ServerWriteReactor<v1::WatchJobResponse>* Watch(grpc::CallbackServerContext* context,
+                                                        const v1::WatchJobRequest* request) override;
+  grpc::ServerUnaryReactor* Cancel(grpc::CallbackServerContext* context, const v1::CancelJobRequest* request,
+                                   v1::CancelJobResponse* response) override;
+
+ private:
+  Runtime& runtime_;
+  JobRegistry& registry_;
+  JobRunner& runner_;
+  StartTraining start_training_;
+};
+
+}  // namespace shaped::server

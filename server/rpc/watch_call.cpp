@@ -1,0 +1,65 @@
+#include "server/rpc/watch_call.h"
+
+#include "server/convert/job.h"
+
+namespace shaped::server {
+
+WatchCall::WatchCall(Runtime& runtime, JobRegistry& registry, grpc::CallbackServerContext& context, std::string job)
+    : registry_(registry), call_(runtime, context, "Jobs.Watch"), job_(std::move(job)) {}
+
+void WatchCall::enter() {
+  self_ = shared_from_this();
+  const auto status = call_.guarded([this] {
+    listener_ = registry_.listen(job_, [weak = weak_from_this()] {
+      if (const auto self = weak.lock()) self->onChange();
+    });
+  });
+  status.ok() ? onChange() : end(status);
+}
+
+void WatchCall::onChange() {
+  const std::scoped_lock lock(mutex_);
+  changed_ = true;
+  if (!writing_) writeNext();
+}
+
+void WatchCall::writeNext() {
+  if (last_) return;
+  changed_ = false;
+  const auto status = call_.guarded([this] {
+    const auto record = registry_.get(job_);
+    last_ = hasEnded(record.state);
+    message_.Clear();
+    toProto(record, *message_.mutable_job());
+  });
+  if (!status.ok()) return end(status);
+  writing_ = true;
+  StartWrite(&message_);
+}
+
+void WatchCall::OnWriteDone(bool ok) {
+  const std::scoped_lock lock(mutex_);
+  writing_ = false;
+  if (!ok) call_.stop(StopReason::kClient);
+  if (call_.stopped()) return end(call_.stopStatus());
+  if (last_) return end(grpc::Status::OK);
+  if (changed_) writeNext();
+}
+
+void WatchCall::end(const grpc::Status& status) {
+  last_ = true;
+  if (call_.finishOnce(status)) Finish(status);
+}
+
+void WatchCall::OnCancel() {
+  const std::scoped_lock lock(mutex_);
+  call_.stop(StopReason::kClient);
+  if (!writing_) end(call_.stopStatus());  // else OnWriteDone does
+}
+
+void WatchCall::OnDone() {
+  listener_.reset();
+  const auto self = std::move(self_);
+}
+
+}  // namespace shaped::server

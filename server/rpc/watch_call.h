@@ -1,0 +1,41 @@
+#pragma once
+
+#include <grpcpp/support/server_callback.h>
+
+#include <memory>
+#include <mutex>
+#include <string>
+
+#include "server/jobs/job_registry.h"
+#include "server/rpc/call.h"
+#include "shaped/v1/jobs.pb.h"
+
+namespace shaped::server {
+
+/// Streams a job's states until it has ended. Woken by the registry, holds no thread while nothing happens; while a
+/// message is on its way, changes are merged into the next one.
+class WatchCall final : public grpc::ServerWriteReactor<v1::WatchJobResponse>,
+                        public std::enable_shared_from_this<WatchCall> {
+ public:
+  WatchCall(Runtime& runtime, JobRegistry& registry, grpc::CallbackServerContext& context, std::string job);
+  void enter();
+
+ private:
+  void onChange();
+  void writeNext();
+  void end(const grpc::Status& status);
+  void OnWriteDone(bool ok) override;
+  void OnCancel() override;
+  void OnDone() override;
+
+  JobRegistry& registry_;
+  Call call_;
+  const std::string job_;
+  std::recursive_mutex mutex_;  // gRPC may run a reaction inside the call that causes it
+  bool writing_ = false, changed_ = false, last_ = false;
+  v1::WatchJobResponse message_;
+  std::shared_ptr<const JobRegistry::Listener> listener_;
+  std::shared_ptr<WatchCall> self_;
+};
+
+}  // namespace shaped::server

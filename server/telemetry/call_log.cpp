@@ -1,0 +1,46 @@
+#include "server/telemetry/call_log.h"
+
+#include <spdlog/sinks/stdout_sinks.h>
+#include <spdlog/spdlog.h>
+
+#include <algorithm>
+#include <cctype>
+
+#include "core/numerics/error.h"
+
+namespace shaped::server {
+namespace {
+
+/// What clients write must not forge log lines.
+std::string oneLine(std::string text) {
+  std::replace_if(
+      text.begin(), text.end(), [](unsigned char c) { return std::iscntrl(c) != 0; }, ' ');
+  return text;
+}
+
+}  // namespace
+
+void startLog(const std::string& level) {
+  const auto parsed = spdlog::level::from_str(level == "warn" ? "warning" : level);
+  if (parsed == spdlog::level::off)
+    throw InvalidInput("--log", "\"" + level + "\" is no level; use debug, info, warn or error");
+  auto logger = spdlog::stderr_logger_mt("shaped");
+  logger->set_level(parsed);
+  logger->set_pattern("%Y-%m-%dT%H:%M:%S.%e%z %l %v");
+  logger->flush_on(spdlog::level::info);
+  spdlog::set_default_logger(std::move(logger));
+}
+
+void logCall(const CallRecord& record, bool servers_fault) {
+  const auto level = record.message.empty() ? spdlog::level::info
+                     : servers_fault        ? spdlog::level::err
+                                            : spdlog::level::warn;
+  spdlog::log(level, "request={} method={} model={} outcome={} seconds={:.6f}{}{}", record.request_id, record.method,
+              record.model.empty() ? "-" : oneLine(record.model), record.outcome, record.seconds,
+              record.message.empty() ? "" : " message=", oneLine(record.message));
+}
+
+void logInfo(const std::string& line) { spdlog::info(oneLine(line)); }
+void logError(const std::string& line) { spdlog::error(oneLine(line)); }
+
+}  // namespace shaped::server

@@ -1,0 +1,29 @@
+#pragma once
+
+#include <cstdint>
+#include <string>
+
+namespace shaped::server {
+
+/// One call that has ended, for the log.
+struct CallRecord {
+  std::uint64_t request_id = 0;
+  std::string method;   ///< "Shapes.Project"
+  std::string model;    ///< "NAME@VERSION"; empty where no model took part
+  std::string outcome;  ///< gRPC status name
+  std::string message;  ///< of a status that is not OK
+  double seconds = 0;   ///< from arrival to answer
+};
+
+/// Sets level and pattern of the process's log on stderr. level: trace, debug, info, warn, error; throws InvalidInput
+/// for another.
+void startLog(const std::string& level);
+
+/// Writes the record as one line: info when OK, warn for what the client did, error for what the server did.
+void logCall(const CallRecord& record, bool servers_fault);
+
+/// One line about the daemon itself.
+void logInfo(const std::string& line);
+void logError(const std::string& line);
+
+}  // namespace shaped::server
