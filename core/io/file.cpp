@@ -75,14 +75,15 @@ FileWriter::FileWriter(fs::path path) : path_(std::move(path)) {
     const auto target = fs::weakly_canonical(path_, ignored);
     if (!ignored) path_ = target;
   }
-  const bool direct = fs::exists(path_, ignored) && !fs::is_regular_file(path_, ignored);
-  if (!direct) temporary_ = temporaryBeside(path_);
-  const auto& target = direct ? path_ : temporary_;
-  descriptor_ = ::open(target.c_str(), O_WRONLY | O_CLOEXEC | O_CREAT | (direct ? 0 : O_EXCL), 0666);
-  if (descriptor_ < 0) {
-    temporary_.clear();
-    fail("cannot be created: " + reason(errno));
+  if (fs::exists(path_, ignored) && !fs::is_regular_file(path_, ignored)) {
+    descriptor_ = ::open(path_.c_str(), O_WRONLY | O_CLOEXEC);
+  } else {
+    do {  // a crashed process of our number may have left a file of this name
+      temporary_ = temporaryBeside(path_);
+      descriptor_ = ::open(temporary_.c_str(), O_WRONLY | O_CLOEXEC | O_CREAT | O_EXCL, 0666);
+    } while (descriptor_ < 0 && errno == EEXIST);
   }
+  if (descriptor_ < 0) fail("cannot be created: " + reason(errno));
 }
 
 FileWriter::~FileWriter() {

@@ -1,0 +1,232 @@
+#include "core/io/model_directory.h"
+
+#include <unistd.h>
+
+#include <algorithm>
+
+#include "core/io/file.h"
+#include "core/io/file_error.h"
+#include "core/io/folder.h"
+#include "core/io/sha256.h"
+#include "core/io/text_scanner.h"
+
+namespace shaped {
+namespace {
+
+namespace fs = std::filesystem;
+using nlohmann::json;
+
+constexpr const char* kManifest = "manifest.json";
+constexpr const char* kTensors = "tensors.safetensors";
+constexpr std::int64_t kMostVersions = 1'000'000'000'000;
+constexpr const char* kHighestVersion = ".highest-version";  ///< ever given; only written when that version is removed
+
+void requireName(const std::string& model) {
+  const auto allowed = [](char c) {
+    return (c >= 'A' && c <= 'Z') || (c >= 'a' && c <= 'z') || (c >= '0' && c <= '9') || c == '.' || c == '_' ||
+           c == '-';
+  };
+  if (model.empty() || model.size() > 100 || model.front() == '.' || !std::all_of(model.begin(), model.end(), allowed))
+    throw InvalidInput(
+        "model", quotedWord(model) + " is no name for a model; want 1 to 100 of A-Z a-z 0-9 . _ -, the first no dot");
+}
+
+/// The number of a version's folder; 0 for any other entry.
+std::int64_t versionOf(const fs::path& folder) {
+  const auto name = folder.filename().string();
+  std::int64_t version = 0;
+  if (!parseInteger(name, version) || version < 1 || version > kMostVersions || std::to_string(version) != name)
+    return 0;
+  return version;
+}
+
+std::vector<std::int64_t> versionsIn(const fs::path& model_folder) {
+  std::vector<std::int64_t> versions;
+  std::error_code none;
+  for (const auto& entry : fs::directory_iterator(model_folder, none))
+    if (const auto version = versionOf(entry.path()); version > 0 && entry.is_directory(none))
+      versions.push_back(version);
+  std::sort(versions.begin(), versions.end());
+  return versions;
+}
+
+/// The highest version ever given in this folder. Call with the folder locked.
+std::int64_t highestVersion(const fs::path& model_folder) {
+  const auto versions = versionsIn(model_folder);
+  std::int64_t highest = versions.empty() ? 0 : versions.back(), removed = 0;
+  std::error_code none;
+  const auto note = model_folder / kHighestVersion;
+  if (fs::exists(note, none) && parseInteger(readFile(note), removed)) highest = std::max(highest, removed);
+  return highest;
+}
+
+std::string toJson(const ModelManifest& manifest) {
+  const json tensors = {{"file", kTensors}, {"bytes", manifest.tensors_bytes}, {"sha256", manifest.tensors_sha256}};
+  const json document = {{"kind", manifest.kind},
+                         {"format_version", manifest.format_version},
+                         {"created_by", manifest.created_by},
+                         {"tensors", tensors},
+                         {"description", manifest.description}};
+  return document.dump(2) + "\n";
+}
+
+void requireManifest(const ModelManifest& manifest) {
+  if (manifest.kind.empty() || manifest.format_version < 1)
+    throw InvalidInput("manifest", "needs a kind and a format version of at least 1");
+  if (!manifest.description.is_object()) throw InvalidInput("manifest.description", "must be a JSON object");
+  try {
+    toJson(manifest);
+  } catch (const json::exception&) {
+    throw InvalidInput("manifest", "holds text that is not UTF-8");
+  }
+}
+
+/// A scratch folder in the model's folder, which is made when it is missing.
+ScratchFolder beginPublishing(const fs::path& folder) {
+  for (int attempt = 0;; ++attempt) {
+    makeFolder(folder);
+    try {
+      const FolderLock lock(folder);  // nobody clears the scratch folder away before its owner holds it
+      removeAbandoned(folder);
+      return ScratchFolder(folder);
+    } catch (const FileError&) {
+      // Another publisher that failed may have removed the folder of a model without versions at this moment.
+      if (fs::exists(folder) || attempt == 10) throw;
+    }
+  }
+}
+
+ModelManifest readManifest(const fs::path& path) {
+  try {
+    const auto document = json::parse(readFile(path));
+    ModelManifest manifest;
+    document.at("kind").get_to(manifest.kind);
+    document.at("format_version").get_to(manifest.format_version);
+    document.at("created_by").get_to(manifest.created_by);
+    document.at("tensors").at("sha256").get_to(manifest.tensors_sha256);
+    document.at("tensors").at("bytes").get_to(manifest.tensors_bytes);
+    manifest.description = document.at("description");
+    return manifest;
+  } catch (const json::exception& problem) {
+    throw FileError(path.string(), std::string("is no model manifest: ") + problem.what());
+  } catch (const InvalidInput& problem) {
+    throw FileError(path.string(), std::string("is no model manifest: ") + problem.what());
+  }
+}
+
+/// Writes both files; the manifest learns size and hash of the tensors while they are written.
+void writeFiles(const fs::path& folder, ModelManifest& manifest, const TensorWriter& tensors) {
+  Sha256 hash;
+  manifest.tensors_bytes = 0;
+  FileWriter file(folder / kTensors);
+  tensors.write([&](std::string_view bytes) {
+    hash.update(bytes);
+    manifest.tensors_bytes += bytes.size();
+    file.write(bytes);
+  });
+  file.commit();
+  manifest.tensors_sha256 = hash.finish();
+  writeFile(folder / kManifest, toJson(manifest));
+  syncFolder(folder);
+}
+
+/// Maps the tensors and compares them with what the manifest says of them.
+std::shared_ptr<const TensorFile> readTensors(const fs::path& path, const ModelManifest& manifest) {
+  std::shared_ptr<const TensorFile> tensors;
+  try {
+    tensors = std::make_shared<const TensorFile>(path);
+  } catch (const InvalidInput& problem) {
+    throw FileError(path.string(), std::string("is damaged: ") + problem.what());
+  }
+  if (tensors->bytes().size() != manifest.tensors_bytes)
+    throw FileError(path.string(), "has " + std::to_string(tensors->bytes().size()) + " bytes, its manifest says " +
+                                       std::to_string(manifest.tensors_bytes) + "; restore or remove this version");
+  if (const auto hash = sha256(tensors->bytes()); hash != manifest.tensors_sha256)
+    throw FileError(path.string(), "has SHA-256 " + hash + ", its manifest says " + manifest.tensors_sha256 +
+                                       "; restore or remove this version");
+  return tensors;
+}
+
+}  // namespace
+
+ModelDirectory::ModelDirectory(fs::path folder) : folder_(fs::absolute(folder)) {
+  std::error_code error;
+  fs::create_directories(folder_, error);
+  if (error) throw FileError(folder_.string(), "cannot be made: " + error.message());
+  const FolderLock lock(folder_);
+  removeAbandoned(folder_);
+}
+
+fs::path ModelDirectory::folderOf(const std::string& model) const {
+  requireName(model);
+  return folder_ / model;
+}
+
+fs::path ModelDirectory::folderOf(const std::string& model, std::optional<std::int64_t>& version) const {
+  const auto known = versions(model);
+  if (known.empty()) throw ModelNotFound("model", "there is no model " + quotedWord(model));
+  if (!version) version = known.back();
+  if (!std::binary_search(known.begin(), known.end(), *version))
+    throw ModelNotFound("model", quotedWord(model) + " has no version " + std::to_string(*version) +
+                                     "; the newest is " + std::to_string(known.back()));
+  return folderOf(model) / std::to_string(*version);
+}
+
+std::int64_t ModelDirectory::publish(const std::string& model, ModelManifest manifest,
+                                     const TensorWriter& tensors) const {
+  const auto folder = folderOf(model);
+  requireManifest(manifest);
+  try {
+    auto scratch = beginPublishing(folder);
+    writeFiles(scratch.path(), manifest, tensors);
+    const FolderLock lock(folder);
+    const auto version = highestVersion(folder) + 1;
+    scratch.rename(folder / std::to_string(version));
+    return version;
+  } catch (const FileError&) {
+    ::rmdir(folder.c_str());  // fails, as it should, unless the model is new
+    throw;
+  }
+}
+
+ModelManifest ModelDirectory::manifest(const std::string& model, std::optional<std::int64_t> version) const {
+  return readManifest(folderOf(model, version) / kManifest);
+}
+
+StoredModel ModelDirectory::load(const std::string& model, std::optional<std::int64_t> version) const {
+  const auto folder = folderOf(model, version);
+  auto manifest = readManifest(folder / kManifest);
+  auto tensors = readTensors(folder / kTensors, manifest);
+  return {model, *version, std::move(manifest), std::move(tensors)};
+}
+
+std::vector<std::string> ModelDirectory::models() const {
+  std::vector<std::string> names;
+  std::error_code none;
+  for (const auto& entry : fs::directory_iterator(folder_, none)) {
+    const auto name = entry.path().filename().string();
+    if (!name.starts_with('.') && !versionsIn(entry.path()).empty()) names.push_back(name);
+  }
+  std::sort(names.begin(), names.end());
+  return names;
+}
+
+std::vector<std::int64_t> ModelDirectory::versions(const std::string& model) const {
+  return versionsIn(folderOf(model));
+}
+
+void ModelDirectory::remove(const std::string& model, std::int64_t version) const {
+  std::optional<std::int64_t> wanted = version;
+  const auto folder = folderOf(model, wanted);
+  const FolderLock lock(folderOf(model));
+  if (highestVersion(folderOf(model)) == version) writeFile(folderOf(model) / kHighestVersion, std::to_string(version));
+  removeFolder(folder);
+}
+
+void ModelDirectory::remove(const std::string& model) const {
+  if (versions(model).empty()) throw ModelNotFound("model", "there is no model " + quotedWord(model));
+  const FolderLock lock(folder_);
+  removeFolder(folderOf(model));
+}
+
+}  // namespace shaped
