@@ -1,0 +1,30 @@
+#pragma once
+
+#include "core/editing/anchored_fit.h"
+#include "core/statistics/submanifold.h"
+
+namespace shaped {
+
+/// Handle editing (21) of [HZRS18]: the shape closest to the submanifold among those that meet the handles.
+struct HandleEdit {
+  Vertices shape;                       ///< s, meets the handles
+  SubmanifoldProjection projection;     ///< P[s]
+  std::vector<double> energies;         ///< W[s, P[s]] after each outer iteration, falling [m^2]
+  double largest_handle_distance = 0;   ///< [m]
+};
+
+struct HandleEditOptions {
+  int outer_iterations = 10;     ///< alternations, >= 1
+  double tolerance = 1e-3;       ///< relative fall of W[s, P[s]] at which the alternation has settled, > 0
+  double handle_tolerance = 1e-8;  ///< largest distance of a handle over the size of the shape, > 0
+  SubmanifoldOptions submanifold;
+};
+
+/// Minimises W[s, P[s]] subject to the handles by alternating between s (Newton's method with the handles as
+/// constraints, by an augmented Lagrangian) and P[s]. A projection that would raise the energy is not taken, so the
+/// energies fall; the outcome is converged when they settle. Weights of the handles are not used. The handles must
+/// determine the placement (determinePlacement), else InvalidInput naming "handles".
+Solved<HandleEdit> editByHandles(const Submanifold& submanifold, const std::vector<AnchorTarget>& handles,
+                                 const HandleEditOptions& options);
+
+}  // namespace shaped
