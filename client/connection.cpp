@@ -7,7 +7,7 @@
 namespace shaped::client {
 namespace {
 
-constexpr int kLargestMessage = 256 << 20;  // a mesh of ten million vertices
+constexpr int kLargestMessage = 64 << 20;  // as the daemon's: a shape of five million vertices
 
 }  // namespace
 

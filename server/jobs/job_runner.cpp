@@ -58,13 +58,7 @@ JobRunner::JobRunner(JobRegistry& registry, const JobLimits& limits)
       pool_(limits.running, {.queue_length = limits.waiting, .queue_bytes = 1, .open_streams = 1},
             limitOpenMpInThisThread) {}
 
-JobRunner::~JobRunner() {
-  const std::scoped_lock lock(mutex_);
-  for (auto& [id, stop] : stops_) {
-    if (pool_.withdraw(numberOf(id))) registry_.update(id, markCancelled);
-    stop.request_stop();
-  }
-}
+JobRunner::~JobRunner() { cancelAll(); }
 
 JobRecord JobRunner::start(const std::string& model_name, const std::string& dataset, Work work) {
   JobRecord request;
@@ -96,6 +90,14 @@ JobRecord JobRunner::cancel(const std::string& job) {
     if (const auto found = stops_.find(id); found != stops_.end()) found->second.request_stop();
   }
   return registry_.get(id);
+}
+
+void JobRunner::cancelAll() {
+  const std::scoped_lock lock(mutex_);
+  for (auto& [id, stop] : stops_) {
+    if (pool_.withdraw(numberOf(id))) registry_.update(id, markCancelled);
+    stop.request_stop();
+  }
 }
 
 void JobRunner::run(const std::string& id, const Work& work, std::stop_token stop) {

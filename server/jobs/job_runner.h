@@ -36,6 +36,8 @@ class JobRunner {
   JobRecord start(const std::string& model_name, const std::string& dataset, Work work);
   /// Asks a job to stop: one that waits ends at once, one that runs soon. Throws NotFound.
   JobRecord cancel(const std::string& job);
+  /// Asks all jobs to stop, without waiting for them.
+  void cancelAll();
 
  private:
   void run(const std::string& id, const Work& work, std::stop_token stop);

@@ -50,8 +50,9 @@ grpc::Status Call::guarded(const std::function<void()>& work) {
 }
 
 void Call::stop(StopReason reason) {
-  // When the client's deadline passes, gRPC reports a cancellation.
-  const bool late = context_.deadline() <= DeadlineTimer::Clock::now();
+  // When the client's deadline passes, gRPC reports a cancellation, a little early: the client's clock started first.
+  constexpr auto slack = std::chrono::milliseconds(50);
+  const bool late = context_.deadline() - slack <= DeadlineTimer::Clock::now();
   stopper_.stop(late ? StopReason::kDeadline : reason);
 }
 

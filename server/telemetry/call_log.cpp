@@ -24,6 +24,7 @@ void startLog(const std::string& level) {
   const auto parsed = spdlog::level::from_str(level == "warn" ? "warning" : level);
   if (parsed == spdlog::level::off)
     throw InvalidInput("--log", "\"" + level + "\" is no level; use debug, info, warn or error");
+  spdlog::drop("shaped");
   auto logger = spdlog::stderr_logger_mt("shaped");
   logger->set_level(parsed);
   logger->set_pattern("%Y-%m-%dT%H:%M:%S.%e%z %l %v");

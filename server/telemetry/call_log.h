@@ -16,7 +16,7 @@ struct CallRecord {
 };
 
 /// Sets level and pattern of the process's log on stderr. level: trace, debug, info, warn, error; throws InvalidInput
-/// for another.
+/// for another. May be called again.
 void startLog(const std::string& level);
 
 /// Writes the record as one line: info when OK, warn for what the client did, error for what the server did.

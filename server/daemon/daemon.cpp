@@ -1,0 +1,64 @@
+#include "server/daemon/daemon.h"
+
+#include <grpcpp/ext/proto_server_reflection_plugin.h>
+#include <grpcpp/health_check_service_interface.h>
+#include <grpcpp/server_builder.h>
+
+#include "core/numerics/error.h"
+#include "core/numerics/threads.h"
+#include "server/rpc/limits.h"
+
+namespace shaped::server {
+namespace {
+
+// Lists, uploads and deletions: short, often waiting for the disk.
+constexpr int kLightThreads = 2;
+
+}  // namespace
+
+Daemon::Daemon(const DaemonOptions& options)
+    : lock_(options.store),
+      datasets_(options.store / "datasets"),
+      pool_(options.threads, options.limits, limitOpenMpInThisThread),
+      light_(kLightThreads, options.limits, {}),
+      jobs_(job_registry_, {.running = 1, .waiting = 64, .threads = options.threads}),
+      runtime_{pool_, light_, timer_, std::chrono::duration<double>(options.longest_call)},
+      datasets_service_(runtime_, datasets_),
+      jobs_service_(runtime_, job_registry_, jobs_, {}),
+      shapes_service_(runtime_) {
+  listen(options.listen);
+}
+
+void Daemon::listen(const std::string& address) {
+  grpc::EnableDefaultHealthCheckService(true);
+  grpc::reflection::InitProtoReflectionServerBuilderPlugin();
+  grpc::ServerBuilder builder;
+  int port = -1;
+  builder.AddListeningPort(address, grpc::InsecureServerCredentials(), &port);
+  builder.SetMaxReceiveMessageSize(kLargestMessage);
+  builder.SetMaxSendMessageSize(kLargestMessage);
+  // Two daemons on one port would share its connections at random.
+  builder.AddChannelArgument(GRPC_ARG_ALLOW_REUSEPORT, 0);
+  for (grpc::Service* service :
+       {static_cast<grpc::Service*>(&datasets_service_), static_cast<grpc::Service*>(&jobs_service_),
+        static_cast<grpc::Service*>(&shapes_service_)})
+    builder.RegisterService(service);
+  server_ = builder.BuildAndStart();
+  const bool by_port = !address.starts_with("unix:");
+  if (!server_ || (by_port && port <= 0))
+    throw InvalidInput("--listen", "cannot serve on " + address + "; is the address taken, or not of this machine?");
+  address_ = by_port ? address.substr(0, address.rfind(':')) + ":" + std::to_string(port) : address;
+}
+
+Daemon::~Daemon() { shutdown(std::chrono::seconds(0)); }
+
+void Daemon::shutdown(std::chrono::duration<double> grace) {
+  if (!server_) return;
+  if (auto* health = server_->GetHealthCheckService()) health->SetServingStatus(false);
+  jobs_.cancelAll();
+  server_->Shutdown(std::chrono::system_clock::now() +
+                    std::chrono::duration_cast<std::chrono::system_clock::duration>(grace));
+  server_.reset();
+}
+
+}  // namespace shaped::server

@@ -1,0 +1,50 @@
+#pragma once
+
+#include <grpcpp/server.h>
+
+#include <memory>
+
+#include "server/daemon/options.h"
+#include "server/daemon/store_lock.h"
+#include "server/datasets/dataset_store.h"
+#include "server/jobs/job_runner.h"
+#include "server/rpc/datasets_service.h"
+#include "server/rpc/jobs_service.h"
+#include "server/rpc/shapes_service.h"
+
+namespace shaped::server {
+
+/// Everything that serves one store at one address, with grpc.health.v1 and reflection.
+class Daemon {
+ public:
+  /// Serves from here on. Throws InvalidInput for a bad address or a store in use, FileError for a store that cannot be
+  /// written. Call limitLibraryThreads() before.
+  explicit Daemon(const DaemonOptions& options);
+  /// As shutdown() without grace.
+  ~Daemon();
+  Daemon(const Daemon&) = delete;
+  Daemon& operator=(const Daemon&) = delete;
+
+  /// The address in use, with the real port.
+  const std::string& address() const { return address_; }
+  /// Takes no new calls, cancels jobs, lets running calls go on for `grace`, then cancels them.
+  void shutdown(std::chrono::duration<double> grace);
+
+ private:
+  void listen(const std::string& address);
+
+  const StoreLock lock_;
+  DatasetStore datasets_;
+  MemoryJobRegistry job_registry_;
+  DeadlineTimer timer_;
+  WorkerPool pool_, light_;
+  JobRunner jobs_;
+  Runtime runtime_;
+  DatasetsService datasets_service_;
+  JobsService jobs_service_;
+  ShapesService shapes_service_;
+  std::string address_;
+  std::unique_ptr<grpc::Server> server_;
+};
+
+}  // namespace shaped::server

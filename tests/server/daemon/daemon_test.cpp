@@ -1,0 +1,298 @@
+#include "server/daemon/daemon.h"
+
+#include <catch2/catch.hpp>
+#include <future>
+#include <thread>
+
+#include "server/convert/mesh.h"
+#include "tests/support/daemon.h"
+#include "tests/support/shapes.h"
+
+using namespace shaped;
+using namespace std::chrono_literals;
+using Catch::Contains;
+
+namespace {
+
+using Clock = std::chrono::steady_clock;
+
+const auto sphere = test::icosphere(1);
+
+v1::UploadDatasetRequest header(const std::string& name, std::uint32_t frames) {
+  v1::UploadDatasetRequest message;
+  auto& header = *message.mutable_header();
+  header.set_name(name);
+  header.set_vertex_count(42);
+  v1::Mesh mesh;
+  server::toProto(sphere.vertices, *sphere.topology, mesh);
+  *header.mutable_faces() = mesh.faces();
+  header.set_frames(frames);
+  return message;
+}
+
+v1::UploadDatasetRequest frame(const Vertices& shape) {
+  v1::UploadDatasetRequest message;
+  server::toProto(shape, *message.mutable_frame()->mutable_positions());
+  return message;
+}
+
+grpc::Status upload(const test::TestDaemon& daemon, const std::vector<v1::UploadDatasetRequest>& messages) {
+  const auto stub = v1::Datasets::NewStub(daemon.channel());
+  grpc::ClientContext context;
+  v1::UploadDatasetResponse response;
+  const auto writer = stub->Upload(&context, &response);
+  for (const auto& message : messages)
+    if (!writer->Write(message)) break;
+  writer->WritesDone();
+  return writer->Finish();
+}
+
+v1::ListDatasetsResponse datasets(const test::TestDaemon& daemon) {
+  grpc::ClientContext context;
+  v1::ListDatasetsResponse response;
+  const auto status = v1::Datasets::NewStub(daemon.channel())->List(&context, {}, &response);
+  REQUIRE(status.ok());
+  return response;
+}
+
+/// A path between two tubes; with many times it takes minutes.
+v1::InterpolateRequest pathRequest(int sides, int times) {
+  const auto tube = test::tube(4 * sides, sides);
+  v1::InterpolateRequest request;
+  server::toProto(tube.vertices, *tube.topology, *request.mutable_from());
+  server::toProto(test::bend(tube.vertices, 1), *tube.topology, *request.mutable_to());
+  for (int i = 0; i < times; ++i) request.add_times((i + 0.5) / times);
+  return request;
+}
+
+/// Reads a path to its end; the summary is empty when there was none.
+struct PathAnswer {
+  v1::InterpolateResponse::Summary summary;
+  std::vector<v1::InterpolateResponse::Frame> frames;
+  grpc::Status status;
+  std::string pushback;
+};
+
+PathAnswer interpolate(const test::TestDaemon& daemon, const v1::InterpolateRequest& request,
+                       grpc::ClientContext& context) {
+  PathAnswer answer;
+  const auto stub = v1::Shapes::NewStub(daemon.channel());
+  const auto reader = stub->Interpolate(&context, request);
+  v1::InterpolateResponse response;
+  while (reader->Read(&response)) {
+    if (response.has_summary()) answer.summary = response.summary();
+    if (response.has_frame()) answer.frames.push_back(response.frame());
+  }
+  answer.status = reader->Finish();
+  const auto& metadata = context.GetServerTrailingMetadata();
+  if (const auto found = metadata.find("grpc-retry-pushback-ms"); found != metadata.end())
+    answer.pushback = std::string(found->second.data(), found->second.size());
+  return answer;
+}
+
+server::DaemonOptions oneThread() {
+  server::DaemonOptions options;
+  options.threads = 1;
+  return options;
+}
+
+}  // namespace
+
+TEST_CASE("a dataset travels to the daemon and back out of it") {
+  const test::TestDaemon daemon;
+  REQUIRE(upload(daemon, {header("spheres", 2), frame(sphere.vertices), frame(2 * sphere.vertices)}).ok());
+  const auto listed = datasets(daemon);
+  REQUIRE(listed.datasets_size() == 1);
+  CHECK(listed.datasets(0).name() == "spheres");
+  CHECK(listed.datasets(0).frames() == 2);
+  CHECK(listed.datasets(0).topology_id() == sphere.topology->id());
+  const auto stub = v1::Datasets::NewStub(daemon.channel());
+  v1::DeleteDatasetRequest request;
+  request.set_name("spheres");
+  v1::DeleteDatasetResponse response;
+  grpc::ClientContext first, second;
+  CHECK(stub->Delete(&first, request, &response).ok());
+  CHECK(stub->Delete(&second, request, &response).error_code() == grpc::NOT_FOUND);
+}
+
+TEST_CASE("faulty uploads are refused by frame and leave nothing") {
+  const test::TestDaemon daemon;
+  const auto refused = [&](const std::vector<v1::UploadDatasetRequest>& messages, const std::string& text) {
+    const auto status = upload(daemon, messages);
+    CHECK(status.error_code() == grpc::INVALID_ARGUMENT);
+    CHECK_THAT(status.error_message(), Contains(text));
+  };
+  auto nan = frame(sphere.vertices);
+  nan.mutable_frame()->set_positions(10, std::numeric_limits<float>::quiet_NaN());
+  nan.mutable_frame()->set_label("b.ply");
+  refused({header("d", 2), frame(sphere.vertices), nan}, "frames[1] (b.ply): vertex 3");
+  refused({header("d", 1), frame(sphere.vertices.topRows(40))}, "frames[0]: has 120 coordinates, want 126");
+  refused({header("d", 2), frame(sphere.vertices)}, "announced 2, 1 came");
+  refused({frame(sphere.vertices)}, "header: is missing");
+  refused({header("d", 1), header("d", 1)}, "header: came a second time");
+  refused({}, "header: is missing");
+  refused({header("d/e", 1)}, "name: want");
+  auto bad_index = header("d", 1);
+  bad_index.mutable_header()->set_faces(0, 42);
+  refused({bad_index}, "header.faces[0]: vertex index 42");
+  CHECK(datasets(daemon).datasets_size() == 0);
+}
+
+TEST_CASE("an upload that is broken off leaves nothing") {
+  const test::TestDaemon daemon;
+  {
+    const auto stub = v1::Datasets::NewStub(daemon.channel());
+    grpc::ClientContext context;
+    v1::UploadDatasetResponse response;
+    const auto writer = stub->Upload(&context, &response);
+    writer->Write(header("d", 1));
+    writer->Write(frame(sphere.vertices));
+    context.TryCancel();
+    CHECK(writer->Finish().error_code() == grpc::CANCELLED);
+  }
+  const auto folder = daemon.folder / "store/datasets";
+  const auto until = Clock::now() + 10s;
+  while (!std::filesystem::is_empty(folder) && Clock::now() < until) std::this_thread::sleep_for(5ms);
+  CHECK(std::filesystem::is_empty(folder));
+}
+
+TEST_CASE("interpolation reports the path and sends a frame for each time") {
+  const test::TestDaemon daemon;
+  grpc::ClientContext context;
+  auto request = pathRequest(6, 0);
+  for (const double time : {0.0, 0.5, 1.0, 1.25}) request.add_times(time);
+  const auto answer = interpolate(daemon, request, context);
+  REQUIRE(answer.status.ok());
+  CHECK(answer.summary.report().termination() == v1::TERMINATION_CONVERGED);
+  REQUIRE(answer.summary.segment_energies_size() == 4);
+  double sum = 0;
+  for (const double energy : answer.summary.segment_energies()) sum += energy;
+  CHECK(answer.summary.path_energy() == Approx(4 * sum));
+  CHECK(answer.summary.smallest_area_ratio() > 0.1);
+  REQUIRE(answer.frames.size() == 4);
+  for (int i = 0; i < 3; i += 2) {
+    const auto& ends = i == 0 ? request.from().positions() : request.to().positions();
+    for (int k = 0; k < ends.size(); ++k)
+      REQUIRE(answer.frames[i].shape().positions(k) == Approx(ends[k]).margin(1e-6));
+  }
+}
+
+TEST_CASE("faulty paths are refused by field") {
+  const test::TestDaemon daemon;
+  const auto refused = [&](const v1::InterpolateRequest& request, const std::string& text) {
+    grpc::ClientContext context;
+    const auto answer = interpolate(daemon, request, context);
+    CHECK(answer.status.error_code() == grpc::INVALID_ARGUMENT);
+    CHECK_THAT(answer.status.error_message(), Contains(text));
+  };
+  const auto good = pathRequest(6, 1);
+  auto request = good;
+  request.set_path_steps(5000);
+  refused(request, "path_steps: = 5000");
+  request = good;
+  request.set_times(0, 11);
+  refused(request, "times[0]: = 11");
+  request = good;
+  request.set_bending(-1);
+  refused(request, "bending: = -1");
+  request = good;
+  request.mutable_to()->mutable_positions()->Truncate(30);
+  refused(request, "to: has 10 vertices");
+  refused({}, "from.faces");
+}
+
+TEST_CASE("deadline and cancellation stop a running solver") {
+  const test::TestDaemon daemon(oneThread());
+  const auto slow = pathRequest(24, 10000);
+  {
+    grpc::ClientContext context;
+    context.set_deadline(std::chrono::system_clock::now() + 400ms);
+    CHECK(interpolate(daemon, slow, context).status.error_code() == grpc::DEADLINE_EXCEEDED);
+  }
+  grpc::ClientContext context;
+  auto running = std::async(std::launch::async, [&] { return interpolate(daemon, slow, context); });
+  std::this_thread::sleep_for(300ms);
+  context.TryCancel();
+  CHECK(running.get().status.error_code() == grpc::CANCELLED);
+  // The only worker is free again soon.
+  grpc::ClientContext next;
+  const auto begin = Clock::now();
+  CHECK(interpolate(daemon, pathRequest(4, 0), next).status.ok());
+  CHECK(Clock::now() - begin < 3s);
+}
+
+TEST_CASE("the server's own cap ends a call without a deadline, also while it waits") {
+  auto options = oneThread();
+  options.longest_call = 0.5;
+  const test::TestDaemon daemon(options);
+  grpc::ClientContext first, second;
+  const auto slow = pathRequest(24, 10000);
+  auto running = std::async(std::launch::async, [&] { return interpolate(daemon, slow, first); });
+  std::this_thread::sleep_for(100ms);
+  const auto waiting = interpolate(daemon, slow, second);
+  CHECK(running.get().status.error_code() == grpc::DEADLINE_EXCEEDED);
+  CHECK(waiting.status.error_code() == grpc::DEADLINE_EXCEEDED);
+}
+
+TEST_CASE("a full queue refuses with a delay, and lists still answer") {
+  auto options = oneThread();
+  options.limits.queue_length = 1;
+  const test::TestDaemon daemon(options);
+  const auto slow = pathRequest(24, 10000);
+  std::vector<std::unique_ptr<grpc::ClientContext>> contexts;
+  std::vector<std::future<PathAnswer>> calls;
+  for (int i = 0; i < 3; ++i) {
+    contexts.push_back(std::make_unique<grpc::ClientContext>());
+    calls.push_back(std::async(std::launch::async, [&, i] { return interpolate(daemon, slow, *contexts[i]); }));
+    std::this_thread::sleep_for(200ms);
+  }
+  const auto refused = calls[2].get();  // one runs, one waits
+  CHECK(refused.status.error_code() == grpc::RESOURCE_EXHAUSTED);
+  CHECK_THAT(refused.status.error_message(), Contains("busy") && Contains("try again in"));
+  CHECK(std::stoi(refused.pushback) >= 100);
+  CHECK(datasets(daemon).datasets_size() == 0);
+  for (int i = 0; i < 2; ++i) {
+    contexts[i]->TryCancel();
+    CHECK(calls[i].get().status.error_code() == grpc::CANCELLED);
+  }
+}
+
+TEST_CASE("shutting down ends running calls") {
+  test::TestDaemon daemon(oneThread());
+  const auto slow = pathRequest(24, 10000);
+  grpc::ClientContext context;
+  auto running = std::async(std::launch::async, [&] { return interpolate(daemon, slow, context); });
+  std::this_thread::sleep_for(200ms);
+  const auto begin = Clock::now();
+  daemon.daemon.shutdown(0.1s);
+  CHECK(Clock::now() - begin < 5s);
+  CHECK_FALSE(running.get().status.ok());
+}
+
+TEST_CASE("unknown jobs are not found, in every method") {
+  const test::TestDaemon daemon;
+  const auto stub = v1::Jobs::NewStub(daemon.channel());
+  grpc::ClientContext get, cancel, watch;
+  v1::GetJobRequest get_request;
+  get_request.set_id("7");
+  v1::GetJobResponse got;
+  CHECK(stub->Get(&get, get_request, &got).error_code() == grpc::NOT_FOUND);
+  v1::CancelJobRequest cancel_request;
+  cancel_request.set_id("7");
+  v1::CancelJobResponse cancelled;
+  CHECK(stub->Cancel(&cancel, cancel_request, &cancelled).error_code() == grpc::NOT_FOUND);
+  v1::WatchJobRequest watch_request;
+  watch_request.set_id("7");
+  const auto reader = stub->Watch(&watch, watch_request);
+  v1::WatchJobResponse watched;
+  CHECK_FALSE(reader->Read(&watched));
+  CHECK(reader->Finish().error_code() == grpc::NOT_FOUND);
+}
+
+TEST_CASE("an address in use is refused") {
+  const test::TestDaemon daemon;
+  server::DaemonOptions options;
+  options.listen = daemon.daemon.address();
+  options.store = daemon.folder / "other";
+  CHECK_THROWS_WITH(server::Daemon(options), Contains("--listen: cannot serve on"));
+}
