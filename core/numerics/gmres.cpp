@@ -22,6 +22,7 @@ double gmres(const LinearMap& matrix, const LinearMap& preconditioner, const Eig
   for (; k < limit && std::abs(g[k]) > reduction * start; ++k) {
     matrix(basis.back(), image);
     preconditioner(image, w);
+    const double size = w.norm();
     for (int i = 0; i <= k; ++i) {
       h(i, k) = w.dot(basis[static_cast<std::size_t>(i)]);
       w -= h(i, k) * basis[static_cast<std::size_t>(i)];
@@ -38,7 +39,7 @@ double gmres(const LinearMap& matrix, const LinearMap& preconditioner, const Eig
     h(k, k) = length;
     g[k + 1] = -rotations.back().s() * g[k];
     g[k] *= rotations.back().c();
-    if (rest <= 1e-14 * start) {
+    if (rest <= 1e-14 * size) {  // the Krylov space is exhausted
       ++k;
       break;
     }
