@@ -39,8 +39,8 @@ class CholeskyFactor {
   /// then solve() must not be called.
   bool factorise(const SymmetricBlockMatrix& matrix, const Pins& pins);
 
-  /// x = A^-1 b with zero in the pinned unknowns; x and b may be the same, `columns` right-hand sides one after another.
-  /// May be called from several threads at once.
+  /// x = A^-1 b with zero in the pinned unknowns, whatever b holds there; x and b may be the same, `columns` right-hand
+  /// sides one after another. May be called from several threads at once.
   void solve(const double* b, double* x, int columns = 1) const;
 
  private:

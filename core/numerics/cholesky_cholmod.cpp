@@ -104,6 +104,7 @@ CholeskyAnalysis::~CholeskyAnalysis() = default;
 struct CholeskyFactor::Impl {
   CholeskyAnalysisPtr analysis;
   SparsePtr matrix;
+  Pins held;
   cholmod_factor* factor = nullptr;
   ~Impl() {
     if (factor) freeFactor(factor);
@@ -114,7 +115,7 @@ struct CholeskyFactor::Impl {
 };
 
 CholeskyFactor::CholeskyFactor(CholeskyAnalysisPtr analysis)
-    : impl_(new Impl{std::move(analysis), SparsePtr(nullptr, freeSparse)}) {
+    : impl_(new Impl{std::move(analysis), SparsePtr(nullptr, freeSparse), {}}) {
   impl_->factor = cholmod_copy_factor(impl_->analysis->impl_->symbolic, ThreadCommon::get());
   if (!impl_->factor) throw std::bad_alloc();
 }
@@ -159,6 +160,7 @@ bool CholeskyFactor::factorise(const SymmetricBlockMatrix& matrix, const Pins& p
   const bool done = finite && cholmod_factorize(impl_->matrix.get(), impl_->factor, common) &&
                     common->status == CHOLMOD_OK && impl_->factor->minor == impl_->factor->n;
   impl_->matrix.reset();
+  impl_->held = pins;
   return done;
 }
 
@@ -183,6 +185,7 @@ void CholeskyFactor::solve(const double* b, double* x, int columns) const {
     throw std::runtime_error("CHOLMOD could not solve with a factor");
   const auto* solution = static_cast<const double*>(work.x->x);
   std::copy(solution, solution + n * rhs.ncol, x);
+  for (std::size_t column = 0; column < rhs.ncol; ++column) impl_->held.clear(x + n * column);
 }
 
 }  // namespace shaped

@@ -14,6 +14,7 @@ CholeskyAnalysis::~CholeskyAnalysis() = default;
 
 struct CholeskyFactor::Impl {
   Eigen::SimplicialLLT<Eigen::SparseMatrix<double>, Eigen::Lower> solver;
+  Pins held;
   bool analysed = false;
 };
 
@@ -31,6 +32,7 @@ bool CholeskyFactor::factorise(const SymmetricBlockMatrix& matrix, const Pins& p
   if (!sparse.coeffs().allFinite()) return false;
   if (!impl_->analysed) impl_->solver.analyzePattern(sparse);
   impl_->analysed = true;
+  impl_->held = pins;
   impl_->solver.factorize(sparse);
   return impl_->solver.info() == Eigen::Success;
 }
@@ -39,6 +41,7 @@ void CholeskyFactor::solve(const double* b, double* x, int columns) const {
   const auto n = impl_->solver.rows();
   const Eigen::MatrixXd solution = impl_->solver.solve(Eigen::Map<const Eigen::MatrixXd>(b, n, columns));
   Eigen::Map<Eigen::MatrixXd>(x, n, columns) = solution;
+  for (int column = 0; column < columns; ++column) impl_->held.clear(x + n * column);
 }
 
 }  // namespace shaped
