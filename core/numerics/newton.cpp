@@ -79,7 +79,7 @@ Solved<Eigen::VectorXd> minimise(NewtonObjective& objective, const CholeskyAnaly
     if (!run.step()) break;
     outcome.termination = Termination::kConverged;
   }
-  return {run.x(), outcome};
+  return {outcome.termination == Termination::kNumericalFailure ? start : run.x(), outcome};
 }
 
 }  // namespace shaped
