@@ -58,9 +58,9 @@ Header readHeader(std::string_view bytes, const C3dNumbers& numbers) {
 
 /// A 32-bit count in two 16-bit words, the low one first.
 std::optional<std::int64_t> longCount(const C3dParameters& parameters, std::string_view name) {
-  const auto low = parameters.number("TRIAL", name, 0);
+  const auto low = parameters.count("TRIAL", name, 0);
   if (!low) return std::nullopt;
-  return std::llround(*low + 65536 * parameters.number("TRIAL", name, 1).value_or(0));
+  return *low + 65536 * parameters.count("TRIAL", name, 1).value_or(0);
 }
 
 struct Claim {
@@ -74,9 +74,8 @@ std::vector<Claim> frameClaims(const Header& header, const C3dParameters& parame
   const auto begin = longCount(parameters, "ACTUAL_START_FIELD"), end = longCount(parameters, "ACTUAL_END_FIELD");
   if (begin && end) claims.push_back({"TRIAL:ACTUAL_START_FIELD and ACTUAL_END_FIELD", *end - *begin + 1});
   for (const auto* name : {"LONG_FRAMES", "FRAMES"}) {
-    const auto count = parameters.number("POINT", name);
-    const bool real_number = count && std::isfinite(*count) && std::abs(*count) < 1e15;
-    if (real_number && *count != kLargestWord) claims.push_back({std::string("POINT:") + name, std::llround(*count)});
+    const auto count = parameters.count("POINT", name);
+    if (count && *count != kLargestWord) claims.push_back({std::string("POINT:") + name, *count});
   }
   if (header.last_frame != kLargestWord) claims.push_back({"the header", header.last_frame - header.first_frame + 1});
   if (claims.empty()) claims.push_back({"POINT:FRAMES", kLargestWord});
@@ -123,7 +122,7 @@ Layout layoutOf(const std::string& file, std::string_view bytes, const Header& h
   const std::size_t number_bytes = scale > 0 ? 2 : 4;
   layout.point_bytes = 4 * number_bytes;
   layout.frame_bytes = static_cast<std::size_t>(4 * header.points + header.analog_values) * number_bytes;
-  const auto block = static_cast<std::int64_t>(parameters.number("POINT", "DATA_START").value_or(0));
+  const auto block = parameters.count("POINT", "DATA_START").value_or(0);
   layout.begin =
       static_cast<std::size_t>(std::max<std::int64_t>(block > 1 ? block : header.data_block, 1) - 1) * kBlock;
   if (layout.begin < kBlock) throw InvalidInput(file, "says that its data begin in the header");

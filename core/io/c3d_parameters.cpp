@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cctype>
+#include <cmath>
 #include <cstdlib>
 
 #include "core/io/byte_reader.h"
@@ -92,6 +93,13 @@ std::optional<double> C3dParameters::number(std::string_view group, std::string_
   const char* at = parameter->data.data() + index * size;
   if (size == 1) return loadNumber<std::uint8_t>(at, std::endian::little);
   return size == 2 ? numbers_.word(at) : numbers_.real(at);
+}
+
+std::optional<std::int64_t> C3dParameters::count(std::string_view group, std::string_view name,
+                                                 std::size_t index) const {
+  const auto value = number(group, name, index);
+  if (!value || !(std::abs(*value) < 1e12)) return std::nullopt;
+  return std::llround(*value);
 }
 
 }  // namespace shaped

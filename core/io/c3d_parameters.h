@@ -22,6 +22,8 @@ class C3dParameters {
   std::vector<std::string> texts(std::string_view group, std::string_view name) const;
   /// Entry `index` of a number array, integers unsigned; nothing when there is no such parameter or entry.
   std::optional<double> number(std::string_view group, std::string_view name, std::size_t index = 0) const;
+  /// The same, rounded; nothing when it is no number or its magnitude is 1e12 or more.
+  std::optional<std::int64_t> count(std::string_view group, std::string_view name, std::size_t index = 0) const;
 
  private:
   struct Parameter {

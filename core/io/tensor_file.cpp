@@ -72,6 +72,17 @@ json parseStrictly(const std::string& file, std::string_view text) {
   }
 }
 
+bool isTensorDescription(const json& entry) {
+  const auto wholeNumbers = [&](const char* key) {
+    return entry.contains(key) && entry[key].is_array() &&
+           std::all_of(entry[key].begin(), entry[key].end(), [](const json& number) {
+             return number.is_number_unsigned() && number.get<std::uint64_t>() < (std::uint64_t{1} << 63);
+           });
+  };
+  return entry.is_object() && entry.size() == 3 && entry.contains("dtype") && entry["dtype"].is_string() &&
+         wholeNumbers("shape") && wholeNumbers("data_offsets") && entry["data_offsets"].size() == 2;
+}
+
 std::string_view mapFile(const std::string& file) {
   const int descriptor = ::open(file.c_str(), O_RDONLY | O_CLOEXEC | O_NONBLOCK);
   if (descriptor < 0) throw InvalidInput(file, "cannot be opened: " + std::generic_category().message(errno));
@@ -111,7 +122,7 @@ void TensorFile::readHeader() {
   if (!header.is_object()) throw InvalidInput(file_, "has a header that is no JSON object");
   for (const auto& [name, description] : header.items()) {
     if (name != kMetadata) {
-      addTensor(name, &description);
+      addTensor(name, description);
       continue;
     }
     if (!description.is_object()) throw InvalidInput(file_, "has metadata that are no object");
@@ -123,25 +134,17 @@ void TensorFile::readHeader() {
   requireSeamless();
 }
 
-void TensorFile::addTensor(const std::string& name, const void* description) {
-  const auto& entry = *static_cast<const json*>(description);
+void TensorFile::addTensor(const std::string& name, const json& description) {
   const auto fail = [&](const std::string& problem) {
     throw InvalidInput(file_, "tensor " + quotedWord(name) + " " + problem);
   };
-  const auto wholeNumbers = [](const json& list) {
-    return list.is_array() && std::all_of(list.begin(), list.end(), [](const json& number) {
-             return number.is_number_unsigned() && number.get<std::uint64_t>() < (std::uint64_t{1} << 63);
-           });
-  };
-  if (!entry.is_object() || entry.size() != 3 || !entry.contains("dtype") || !entry["dtype"].is_string() ||
-      !entry.contains("shape") || !wholeNumbers(entry["shape"]) || !entry.contains("data_offsets") ||
-      !wholeNumbers(entry["data_offsets"]) || entry["data_offsets"].size() != 2)
-    fail("is not described by dtype, shape and data_offsets alone");
-  const auto type = entry["dtype"].get<std::string>();
+  if (!isTensorDescription(description)) fail("is not described by dtype, shape and data_offsets alone");
+  const auto type = description["dtype"].get<std::string>();
   const auto* known = std::find_if(kTypes.begin(), kTypes.end(), [&](const TypeName& one) { return one.name == type; });
   if (known == kTypes.end()) fail("has dtype " + quotedWord(type) + "; want F64, F32, I64 or I32");
-  Tensor tensor{known->type, entry["shape"].get<std::vector<std::int64_t>>(),
-                entry["data_offsets"][0].get<std::size_t>(), entry["data_offsets"][1].get<std::size_t>()};
+  const auto& offsets = description["data_offsets"];
+  Tensor tensor{known->type, description["shape"].get<std::vector<std::int64_t>>(), offsets[0].get<std::size_t>(),
+                offsets[1].get<std::size_t>()};
   if (tensor.begin > tensor.end || tensor.end > data_.size())
     fail("reaches from byte " + std::to_string(tensor.begin) + " to " + std::to_string(tensor.end) + " of " +
          std::to_string(data_.size()) + " bytes of data");

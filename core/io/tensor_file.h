@@ -5,6 +5,7 @@
 #include <filesystem>
 #include <functional>
 #include <map>
+#include <nlohmann/json_fwd.hpp>
 #include <span>
 #include <string>
 #include <string_view>
@@ -91,7 +92,7 @@ class TensorFile {
   };
 
   void readHeader();
-  void addTensor(const std::string& name, const void* description);
+  void addTensor(const std::string& name, const nlohmann::json& description);
   void requireSeamless() const;
   const Tensor& find(std::string_view name) const;
   std::string_view bytesOf(std::string_view name, TensorType type) const;
