@@ -93,7 +93,11 @@ Solved<Path> GeodesicCalculus::interpolate(const Vertices& a, const Vertices& b,
   requireValidShape(topology(), b, "b");
   if (steps == 1) return {Path{a, b}, Outcome{}};
   if (warm.size() == static_cast<std::size_t>(steps) + 1) {
+    // inner shapes follow the end by their share of its displacement
+    const Vertices displacement = aligned(b, warm.back()) - warm.back();
     Path path = warm;
+    for (int k = 1; k < steps; ++k) path[static_cast<std::size_t>(k)] += (static_cast<double>(k) / steps) * displacement;
+    if (!std::isfinite(pathEnergy(path)) || pathEnergy(path) > 2 * pathEnergy(warm)) path = warm;
     path.front() = a;
     path.back() = b;
     if (std::isfinite(pathEnergy(path))) {
@@ -117,9 +121,15 @@ Solved<Vertices> GeodesicCalculus::between(const Vertices& a, const Vertices& b,
   objective.addUndeformed(from, 1 - t);
   objective.addDeformed(to, t);
   const NewtonOptions newton{options.max_iterations, options.tolerance, options.stop};
-  Vertices start = reconstruction_->reconstruct(blendMeasures(from, to, t), a);
-  const Vertices nearer = t < 0.5 ? a : aligned(b, a);
-  if (start.rows() == 0 || !(objective.value(flatten(start)) < objective.value(flatten(nearer)))) start = nearer;
+  // the minimum is about t (1 - t) W[a, b]; where the straight blend is near it, nothing better is needed
+  const Vertices end = aligned(b, a);
+  Vertices start = (1 - t) * a + t * end;
+  const double straight = objective.value(flatten(start));
+  if (!(straight <= 2 * t * (1 - t) * shellEnergy(topology(), from, to, bending_))) {
+    start = reconstruction_->reconstruct(blendMeasures(from, to, t), a);
+    const Vertices& nearer = t < 0.5 ? a : end;
+    if (start.rows() == 0 || !(objective.value(flatten(start)) < objective.value(flatten(nearer)))) start = nearer;
+  }
   return minimiseShell(objective, *structure_, start, newton);
 }
 

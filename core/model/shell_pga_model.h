@@ -1,93 +1,79 @@
 #pragma once
 
 #include <memory>
-#include <stop_token>
-#include <string>
-#include <vector>
+#include <mutex>
+#include <optional>
 
-#include "core/mesh/topology.h"
-#include "core/numerics/solved.h"
+#include "core/mesh/anchor.h"
+#include "core/mesh/prolongation.h"
+#include "core/mocap/marker_set.h"
+#include "core/statistics/submanifold.h"
 
 namespace shaped {
 
-/// A point of the Shell PGA submanifold M_J, [HZRS18] (15)-(16), (20).
-struct ShellPgaCoefficients {
-  /// 2J weights of p_1 .. p_J, then of the reflections p_-1 .. p_-J; each >= 0, sum 1.
-  Eigen::VectorXd alpha;
-  /// The factor of (17): the shape is I(mean, q(alpha), 1 / scale); > 0.
-  double scale = 1;
+/// How a model was trained.
+struct TrainingRecord {
+  int shapes = 0;        ///< n
+  Outcome mean;          ///< how the Frechet mean ended
+  Outcome variations;    ///< how the principal variations ended
+  double seconds = 0;    ///< set by whoever measured; 0 where nobody did
+
+  Outcome combined() const { return Outcome(mean) += variations; }
 };
 
-/// How probable a shape is under the model.
-struct ShellPgaScore {
-  double mahalanobis = 0;        ///< distance of the projection to the mean in units of the model's deviations
-  double log_likelihood = 0;     ///< of the projection's tangent coordinates, natural logarithm
-  double residual_distance = 0;  ///< sqrt(W[s, P[s]]), the part that the model does not explain [m]
-};
-
-struct ShellPgaProjection {
-  Vertices shape;                      ///< P[s] at full resolution, rigidly aligned to the input
-  ShellPgaCoefficients coefficients;
-  Eigen::VectorXd tangent_coordinates; ///< J coordinates in the basis of principal components [m]
-  double residual_energy = 0;          ///< W[s, P[s]] on the coarse mesh [m^2]
-  ShellPgaScore score;
-  double smallest_area_ratio = 1;      ///< over triangles: area in `shape` over area in the mean
-};
-
-struct ProjectionOptions {
-  int modes = 0;            ///< J to use, 0 = all of the model's
-  double tolerance = 1e-8;  ///< relative gradient norm of the inner solves, > 0
-  std::stop_token stop;
-};
-
-/// A vertex and where it must lie.
-struct Handle {
-  std::int32_t vertex = 0;     ///< of the full mesh
-  Eigen::Vector3d position{};  ///< [m]
-};
-
-struct EditOptions {
-  int modes = 0;             ///< J to use, 0 = all of the model's
-  int outer_iterations = 10; ///< alternations between s and P[s], >= 1
-  std::stop_token stop;
-};
-
-struct ShellPgaEdit {
-  Vertices shape;                        ///< meets the handles; full resolution
-  Vertices projection;                   ///< P[shape], on the model's submanifold; full resolution
-  ShellPgaCoefficients coefficients;     ///< of `projection`
-  std::vector<double> energies;          ///< W[s, P[s]] after each outer iteration [m^2], falling
-  double largest_handle_distance = 0;    ///< [m]
-  double smallest_area_ratio = 1;
-};
-
-struct EvaluationOptions {
-  std::vector<int> modes;        ///< dimensions to evaluate; empty: 1 .. J
-  int specificity_samples = 50;  ///< random shapes drawn from the model, >= 0
-  unsigned seed = 1;
-  std::stop_token stop;
-};
-
-/// Quality of a model per number of modes; errors are root mean squares over vertices after rigid alignment [m].
-struct ShellPgaEvaluation {
-  std::vector<int> modes;
-  std::vector<double> compactness;     ///< share of the training variance captured, in [0, 1]
-  std::vector<double> generalisation;  ///< error of projecting shapes that were left out of training
-  std::vector<double> specificity;     ///< distance of random model shapes to the nearest training shape
+/// All that a Shell PGA model is made of; what its file holds.
+struct ShellPgaParts {
+  TopologyPtr topology;      ///< of full-resolution shapes
+  Coarsening coarsening;     ///< the mesh that statistics and solvers work on
+  Vertices template_shape;   ///< full resolution; marker offsets are given in its axes
+  Vertices reference;        ///< full resolution; prolongation carries its detail
+  SparseRows detail;         ///< learned correction of the prolongation, V x 2C
+  double bending = 0;        ///< eta [m^2]
+  ShellPga pga;              ///< on the coarse mesh
+  TrainingRecord training;
 };
 
 /// Shell PGA of shapes with one connectivity: mean, variances and principal variations of [HZRS18] on a coarse mesh,
 /// and what carries coarse shapes to full resolution. Immutable after construction; safe to share between threads.
-class ShellPgaModel;
-using ShellPgaModelPtr = std::shared_ptr<const ShellPgaModel>;
+class ShellPgaModel {
+ public:
+  explicit ShellPgaModel(ShellPgaParts parts);
 
-/// What describes a model to people.
-struct ShellPgaDescription {
-  int training_shapes = 0, modes = 0, path_steps = 0;
-  int coarse_vertices = 0;
-  double bending = 0;           ///< eta [m^2]
-  Eigen::VectorXd eigenvalues;  ///< all n, falling [m^2]
-  Outcome training;             ///< how the Frechet mean ended
+  const Topology& topology() const { return *parts_.topology; }
+  const ShellPgaParts& parts() const { return parts_; }
+  const ShellPga& pga() const { return submanifold_->pga(); }
+  const Submanifold& submanifold() const { return *submanifold_; }
+  const std::shared_ptr<const Submanifold>& submanifoldPtr() const { return submanifold_; }
+  const GeodesicCalculus& coarseCalculus() const { return submanifold_->calculus(); }
+  int modes() const { return pga().modes(); }
+  /// Full-resolution Frechet mean, V x 3.
+  const Vertices& mean() const { return mean_; }
+
+  /// The coarse rows of a full-resolution shape. Throws InvalidInput naming `field` when the shape does not fit.
+  Vertices restrict(const Vertices& shape, const std::string& field) const;
+  /// A coarse shape at full resolution.
+  Vertices prolongate(const Vertices& coarse) const { return prolongation_.prolongate(coarse); }
+
+  /// Where a full-resolution vertex sits on the coarse mesh. Throws InvalidInput naming `field` when out of range.
+  Anchor anchorOfVertex(std::int32_t vertex, const std::string& field) const;
+  /// Anchors of all markers on the coarse mesh, offsets included. Throws InvalidInput naming markers[i].
+  std::vector<Anchor> anchorsOf(const MarkerSet& markers) const;
+
+  /// Sparsity and symbolic factorisation at full resolution, made at the first call.
+  const ShellStructurePtr& fineStructure() const;
+
+ private:
+  Anchor anchorOfPoint(const Eigen::Vector3d& point) const;
+
+  ShellPgaParts parts_;
+  std::shared_ptr<const Submanifold> submanifold_;
+  Prolongation prolongation_;
+  Vertices mean_;
+  Vertices coarse_reference_, coarse_template_;
+  mutable std::once_flag fine_once_;
+  mutable ShellStructurePtr fine_structure_;
 };
+
+using ShellPgaModelPtr = std::shared_ptr<const ShellPgaModel>;
 
 }  // namespace shaped

@@ -83,6 +83,22 @@ std::vector<Path> splitArms(ElasticNetwork network, std::size_t count, int steps
   return arms;
 }
 
+/// The elastic average with a rough geodesic to each input.
+Spider startSpider(const GeodesicCalculus& calculus, const std::vector<Vertices>& shapes, const FrechetMeanOptions& options) {
+  Spider spider;
+  spider.mean = elasticAverage(calculus, shapes, options).solution;
+  spider.arms.resize(shapes.size());
+  ProgressCounter counter(options.progress, "geodesics to the mean", 0, 0.3, shapes.size());
+  tbb::parallel_for(std::size_t{0}, shapes.size(), [&](std::size_t i) {
+    const Vertices moved = apply(alignRigidly(shapes[i], spider.mean), shapes[i]);
+    // from the input to the mean, as the spider's segments run
+    auto path = calculus.interpolate(moved, spider.mean, options.path_steps, {60, 1e-2, options.stop}).solution;
+    spider.arms[i].assign(std::make_move_iterator(path.rbegin()), std::make_move_iterator(path.rend()));
+    counter.advance(0);
+  });
+  return spider;
+}
+
 }  // namespace
 
 Solved<Spider> frechetMean(const GeodesicCalculus& calculus, const std::vector<Vertices>& shapes,
@@ -92,17 +108,9 @@ Solved<Spider> frechetMean(const GeodesicCalculus& calculus, const std::vector<V
   for (std::size_t i = 0; i < shapes.size(); ++i)
     requireValidShape(calculus.topology(), shapes[i], "shapes[" + std::to_string(i) + "]");
 
-  const auto average = elasticAverage(calculus, shapes, options);
   const int steps = options.path_steps;
-  std::vector<Path> arms(shapes.size());
-  ProgressCounter counter(options.progress, "geodesics to the mean", 0, 0.3, shapes.size());
-  tbb::parallel_for(std::size_t{0}, shapes.size(), [&](std::size_t i) {
-    const Vertices moved = apply(alignRigidly(shapes[i], average.solution), shapes[i]);
-    // from the input to the mean, as the spider's segments run; a rough path will do
-    auto path = calculus.interpolate(moved, average.solution, steps, {60, 1e-2, options.stop}).solution;
-    arms[i].assign(std::make_move_iterator(path.rbegin()), std::make_move_iterator(path.rend()));
-    counter.advance(0);
-  });
+  Spider start = options.start ? *options.start : startSpider(calculus, shapes, options);
+  for (std::size_t i = 0; i < shapes.size(); ++i) start.arms[i].back() = shapes[i];
   NetworkOptions network_options{options.max_iterations, options.tolerance, options.stop, {}};
   if (options.progress)
     network_options.on_iteration = [&](int iteration, double residual) {
@@ -110,7 +118,7 @@ Solved<Spider> frechetMean(const GeodesicCalculus& calculus, const std::vector<V
       options.progress({"Frechet mean, Newton step " + std::to_string(iteration), fraction, residual});
     };
   auto relaxed = relax(calculus.structure(), calculus.bending(),
-                       buildSpider(average.solution, std::move(arms), steps), network_options);
+                       buildSpider(start.mean, std::move(start.arms), steps), network_options);
   Spider spider;
   spider.mean = relaxed.solution.nodes.front();
   spider.arms = splitArms(std::move(relaxed.solution), shapes.size(), steps);

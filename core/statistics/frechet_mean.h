@@ -5,18 +5,19 @@
 
 namespace shaped {
 
+/// The polygonal spider of [HZRS18] Fig. 4.
+struct Spider {
+  Vertices mean;
+  std::vector<Path> arms;  ///< per input shape K + 1 shapes, from the mean to the input
+};
+
 struct FrechetMeanOptions {
   int path_steps = 4;       ///< K of each arm, >= 1
   int max_iterations = 100; ///< joint Newton steps, >= 1
   double tolerance = 1e-8;  ///< on the largest relative force imbalance of any shape, > 0
   std::stop_token stop;
   ProgressSink progress;
-};
-
-/// The polygonal spider of [HZRS18] Fig. 4.
-struct Spider {
-  Vertices mean;
-  std::vector<Path> arms;  ///< per input shape K + 1 shapes, from the mean to the input
+  const Spider* start = nullptr;  ///< of similar shapes in the same order with as many steps; null: start anew
 };
 
 /// The discrete Frechet mean (10) with its geodesics to the inputs, relaxed together: every inner shape of every arm and

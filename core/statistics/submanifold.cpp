@@ -239,4 +239,19 @@ Eigen::VectorXd Submanifold::tangentCoordinates(const SubmanifoldPoint& point) c
   return (point.alpha.head(j) - point.alpha.tail(j)).cwiseProduct(distances_) / point.scale;
 }
 
+SubmanifoldPoint Submanifold::pointOf(const Eigen::VectorXd& tangent_coordinates) const {
+  const Eigen::VectorXd steps = tangent_coordinates.cwiseQuotient(distances_);
+  const double total = steps.cwiseAbs().sum();
+  const auto j = distances_.size();
+  SubmanifoldPoint point;
+  if (!(total > 0)) {  // the mean: any variation balanced by its reflection
+    point.alpha = Eigen::VectorXd::Constant(2 * j, 0.5 / static_cast<double>(j));
+    return point;
+  }
+  point.alpha.resize(2 * j);
+  point.alpha << steps.cwiseMax(0) / total, (-steps).cwiseMax(0) / total;
+  point.scale = 1 / total;
+  return point;
+}
+
 }  // namespace shaped

@@ -50,6 +50,9 @@ class Submanifold {
   /// the point to first order. Their variance over the training shapes is the eigenvalue.
   Eigen::VectorXd tangentCoordinates(const SubmanifoldPoint& point) const;
 
+  /// A point with these tangent coordinates (J entries [m]): the inverse of tangentCoordinates with the fewest weights.
+  SubmanifoldPoint pointOf(const Eigen::VectorXd& tangent_coordinates) const;
+
  private:
   struct LocalProjection;
   std::vector<std::size_t> vertexIndices(int modes) const;

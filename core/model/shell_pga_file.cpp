@@ -1,0 +1,155 @@
+#include "core/model/shell_pga_file.h"
+
+#include "core/io/file_error.h"
+
+namespace shaped {
+namespace {
+
+constexpr int kFormatVersion = 1;
+
+nlohmann::json toJson(const Outcome& outcome) {
+  return {{"termination", name(outcome.termination)}, {"iterations", outcome.iterations}, {"residual", outcome.residual}};
+}
+
+Outcome outcomeFrom(const nlohmann::json& json) {
+  Outcome outcome;
+  const auto text = json.at("termination").get<std::string>();
+  for (const auto kind : {Termination::kConverged, Termination::kIterationLimit, Termination::kStalled,
+                          Termination::kCancelled, Termination::kNumericalFailure})
+    if (name(kind) == text) outcome.termination = kind;
+  outcome.iterations = json.at("iterations").get<int>();
+  outcome.residual = json.at("residual").get<double>();
+  return outcome;
+}
+
+void addSparse(TensorWriter& tensors, const std::string& name, const SparseRows& matrix) {
+  SparseRows compressed = matrix;
+  compressed.makeCompressed();
+  const auto entries = static_cast<std::size_t>(compressed.nonZeros());
+  tensors.add(name + ".row_begin", {compressed.rows() + 1},
+              std::span<const std::int32_t>(compressed.outerIndexPtr(), static_cast<std::size_t>(compressed.rows()) + 1));
+  tensors.add(name + ".columns", {compressed.nonZeros()}, std::span<const std::int32_t>(compressed.innerIndexPtr(), entries));
+  tensors.add(name + ".values", {compressed.nonZeros()}, std::span<const double>(compressed.valuePtr(), entries));
+}
+
+SparseRows sparseFrom(const TensorFile& tensors, const std::string& name, Eigen::Index rows, Eigen::Index columns) {
+  const auto begin = tensors.values<std::int32_t>(name + ".row_begin");
+  const auto index = tensors.values<std::int32_t>(name + ".columns");
+  const auto values = tensors.values<double>(name + ".values");
+  const auto fail = [&](const char* why) { throw InvalidInput(name, why); };
+  if (static_cast<Eigen::Index>(begin.size()) != rows + 1 || index.size() != values.size()) fail("has the wrong size");
+  if (begin.front() != 0 || static_cast<std::size_t>(begin.back()) != values.size()) fail("has broken row limits");
+  std::vector<Eigen::Triplet<double>> triplets;
+  triplets.reserve(values.size());
+  for (Eigen::Index row = 0; row < rows; ++row) {
+    if (begin[static_cast<std::size_t>(row)] > begin[static_cast<std::size_t>(row) + 1]) fail("has broken row limits");
+    for (auto k = begin[static_cast<std::size_t>(row)]; k < begin[static_cast<std::size_t>(row) + 1]; ++k) {
+      const auto column = index[static_cast<std::size_t>(k)];
+      if (column < 0 || column >= columns) fail("has a column out of range");
+      triplets.emplace_back(static_cast<int>(row), column, values[static_cast<std::size_t>(k)]);
+    }
+  }
+  SparseRows matrix(rows, columns);
+  matrix.setFromTriplets(triplets.begin(), triplets.end());
+  return matrix;
+}
+
+/// All variations below each other, 2J C x 3.
+Vertices stack(const std::vector<Vertices>& shapes) {
+  const auto rows = shapes.front().rows();
+  Vertices stacked(rows * static_cast<Eigen::Index>(shapes.size()), 3);
+  for (std::size_t j = 0; j < shapes.size(); ++j) stacked.middleRows(static_cast<Eigen::Index>(j) * rows, rows) = shapes[j];
+  return stacked;
+}
+
+ShellPga pgaFrom(const TensorFile& tensors, int path_steps, Eigen::Index coarse_vertices) {
+  ShellPga pga;
+  pga.mean = tensors.matrix<double>("mean", coarse_vertices, 3);
+  const auto values = tensors.values<double>("eigenvalues");
+  pga.eigenvalues = Eigen::Map<const Eigen::VectorXd>(values.data(), static_cast<Eigen::Index>(values.size()));
+  pga.eigenvectors = tensors.matrix<double>("eigenvectors", pga.eigenvalues.size(), -1);
+  pga.path_steps = path_steps;
+  const auto modes = pga.eigenvectors.cols();
+  const auto stacked = tensors.matrix<double>("variations", 2 * modes * coarse_vertices, 3);
+  for (Eigen::Index j = 0; j < 2 * modes; ++j) pga.variations.push_back(stacked.middleRows(j * coarse_vertices, coarse_vertices));
+  return pga;
+}
+
+ShellPgaParts partsFrom(const StoredModel& stored) {
+  const auto& tensors = *stored.tensors;
+  const auto& description = stored.manifest.description;
+  ShellPgaParts parts;
+  parts.template_shape = tensors.matrix<double>("template", -1, 3);
+  const auto vertex_count = parts.template_shape.rows();
+  parts.topology = std::make_shared<Topology>(static_cast<std::int32_t>(vertex_count), Faces(tensors.matrix<std::int32_t>("faces", -1, 3)));
+  parts.reference = tensors.matrix<double>("reference", vertex_count, 3);
+  const auto kept = tensors.values<std::int32_t>("coarse.kept");
+  parts.coarsening.kept.assign(kept.begin(), kept.end());
+  parts.coarsening.coarse = std::make_shared<Topology>(static_cast<std::int32_t>(kept.size()),
+                                                       Faces(tensors.matrix<std::int32_t>("coarse.faces", -1, 3)));
+  for (const auto vertex : kept)
+    if (vertex < 0 || vertex >= vertex_count) throw InvalidInput("coarse.kept", "names a vertex out of range");
+  const auto coarse_vertices = static_cast<Eigen::Index>(kept.size());
+  parts.detail = sparseFrom(tensors, "detail", vertex_count, 2 * coarse_vertices);
+  parts.bending = description.at("bending").get<double>();
+  parts.pga = pgaFrom(tensors, description.at("path_steps").get<int>(), coarse_vertices);
+  parts.training.shapes = description.at("training_shapes").get<int>();
+  parts.training.mean = outcomeFrom(description.at("training").at("mean"));
+  parts.training.variations = outcomeFrom(description.at("training").at("variations"));
+  parts.training.seconds = description.at("training").at("seconds").get<double>();
+  return parts;
+}
+
+}  // namespace
+
+std::int64_t publishShellPga(const ModelDirectory& directory, const std::string& name, const ShellPgaModel& model) {
+  const auto& parts = model.parts();
+  TensorWriter tensors;
+  tensors.addMatrix("faces", parts.topology->faces());
+  tensors.addMatrix("template", parts.template_shape);
+  tensors.addMatrix("reference", parts.reference);
+  tensors.add("coarse.kept", {static_cast<std::int64_t>(parts.coarsening.kept.size())}, std::span<const std::int32_t>(parts.coarsening.kept));
+  tensors.addMatrix("coarse.faces", parts.coarsening.coarse->faces());
+  addSparse(tensors, "detail", parts.detail);
+  tensors.addMatrix("mean", parts.pga.mean);
+  tensors.add("eigenvalues", {parts.pga.eigenvalues.size()},
+              std::span<const double>(parts.pga.eigenvalues.data(), static_cast<std::size_t>(parts.pga.eigenvalues.size())));
+  tensors.addMatrix("eigenvectors", parts.pga.eigenvectors);
+  tensors.addMatrix("variations", stack(parts.pga.variations));
+
+  ModelManifest manifest;
+  manifest.kind = kShellPgaKind;
+  manifest.format_version = kFormatVersion;
+  manifest.created_by = "shaped " SHAPED_VERSION;
+  manifest.description = {{"vertices", parts.topology->vertexCount()},
+                          {"faces", parts.topology->faces().rows()},
+                          {"topology", parts.topology->id()},
+                          {"coarse_vertices", parts.coarsening.coarse->vertexCount()},
+                          {"modes", model.modes()},
+                          {"path_steps", parts.pga.path_steps},
+                          {"bending", parts.bending},
+                          {"training_shapes", parts.training.shapes},
+                          {"training",
+                           {{"mean", toJson(parts.training.mean)},
+                            {"variations", toJson(parts.training.variations)},
+                            {"seconds", parts.training.seconds}}}};
+  return directory.publish(name, std::move(manifest), tensors);
+}
+
+ShellPgaModelPtr loadShellPga(const StoredModel& stored) {
+  const std::string version = "model " + stored.name + " version " + std::to_string(stored.version);
+  if (stored.manifest.kind != kShellPgaKind)
+    throw FileError(version, "is of kind \"" + stored.manifest.kind + "\", want \"" + kShellPgaKind + "\"");
+  if (stored.manifest.format_version != kFormatVersion)
+    throw FileError(version, "has format version " + std::to_string(stored.manifest.format_version) + ", want " +
+                                 std::to_string(kFormatVersion) + "; train it again or use the daemon that wrote it");
+  try {
+    return std::make_shared<const ShellPgaModel>(partsFrom(stored));
+  } catch (const InvalidInput& problem) {
+    throw FileError(version, std::string("cannot be used: ") + problem.what());
+  } catch (const nlohmann::json::exception& problem) {
+    throw FileError(version, std::string("has a faulty description: ") + problem.what());
+  }
+}
+
+}  // namespace shaped

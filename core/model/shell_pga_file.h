@@ -1,0 +1,18 @@
+#pragma once
+
+#include "core/io/model_directory.h"
+#include "core/model/shell_pga_model.h"
+
+namespace shaped {
+
+/// The kind of a Shell PGA model's manifest.
+inline constexpr const char* kShellPgaKind = "shell_pga";
+
+/// Publishes a model as a new version and returns its number. Throws as ModelDirectory::publish.
+std::int64_t publishShellPga(const ModelDirectory& directory, const std::string& name, const ShellPgaModel& model);
+
+/// Builds the model that a stored version holds. Throws FileError naming the version when the kind or format version is
+/// another, or tensors are missing, of the wrong shape, or make no valid mesh.
+ShellPgaModelPtr loadShellPga(const StoredModel& stored);
+
+}  // namespace shaped

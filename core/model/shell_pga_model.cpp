@@ -1,0 +1,101 @@
+#include "core/model/shell_pga_model.h"
+
+#include <Eigen/Geometry>
+
+#include "core/numerics/error.h"
+#include "core/surface/closest_point.h"
+
+namespace shaped {
+namespace {
+
+std::shared_ptr<const Submanifold> makeSubmanifold(const ShellPgaParts& parts) {
+  auto calculus = std::make_shared<GeodesicCalculus>(std::make_shared<ShellStructure>(parts.coarsening.coarse), parts.bending);
+  return std::make_shared<Submanifold>(std::move(calculus), std::make_shared<ShellPga>(parts.pga));
+}
+
+/// The largest triangle around a coarse vertex: its frame is the steadiest.
+std::int32_t largestFaceAt(const Faces& faces, const Vertices& shape, std::int32_t vertex) {
+  std::int32_t best = -1;
+  double largest = -1;
+  for (std::int32_t f = 0; f < faces.rows(); ++f) {
+    if (faces(f, 0) != vertex && faces(f, 1) != vertex && faces(f, 2) != vertex) continue;
+    const Eigen::RowVector3d a = shape.row(faces(f, 1)) - shape.row(faces(f, 0));
+    const double area = a.cross(Eigen::RowVector3d(shape.row(faces(f, 2)) - shape.row(faces(f, 0)))).norm();
+    if (area > largest) largest = area, best = f;
+  }
+  return best;
+}
+
+}  // namespace
+
+ShellPgaModel::ShellPgaModel(ShellPgaParts parts)
+    : parts_(std::move(parts)), submanifold_(makeSubmanifold(parts_)),
+      prolongation_(parts_.topology, parts_.coarsening, parts_.reference, parts_.detail),
+      mean_(prolongation_.prolongate(parts_.pga.mean)), coarse_reference_(restrictTo(parts_.coarsening, parts_.reference)),
+      coarse_template_(restrictTo(parts_.coarsening, parts_.template_shape)) {}
+
+Vertices ShellPgaModel::restrict(const Vertices& shape, const std::string& field) const {
+  requireValidShape(topology(), shape, field);
+  Vertices coarse = restrictTo(parts_.coarsening, shape);
+  requireValidShape(*parts_.coarsening.coarse, coarse, field + " on the model's coarse mesh");
+  return coarse;
+}
+
+Anchor ShellPgaModel::anchorOfPoint(const Eigen::Vector3d& point) const {
+  const auto& faces = parts_.coarsening.coarse->faces();
+  const auto nearest = ClosestPointQuery(coarse_template_, faces)(point.transpose());
+  return makeAnchor(faces, coarse_template_, nearest.face, Eigen::Vector3d(nearest.barycentric.transpose()), point);
+}
+
+Anchor ShellPgaModel::anchorOfVertex(std::int32_t vertex, const std::string& field) const {
+  if (vertex < 0 || vertex >= topology().vertexCount())
+    throw InvalidInput(field, "vertex " + std::to_string(vertex) + " is outside [0, " +
+                                  std::to_string(topology().vertexCount()) + ")");
+  const auto& kept = parts_.coarsening.kept;
+  const auto at = std::lower_bound(kept.begin(), kept.end(), vertex);
+  if (at == kept.end() || *at != vertex) return anchorOfPoint(parts_.template_shape.row(vertex));
+  const auto coarse = static_cast<std::int32_t>(at - kept.begin());
+  Anchor anchor;
+  const auto& faces = parts_.coarsening.coarse->faces();
+  anchor.face = largestFaceAt(faces, coarse_template_, coarse);
+  for (int c = 0; c < 3; ++c) anchor.barycentric[c] = faces(anchor.face, c) == coarse ? 1 : 0;
+  return anchor;
+}
+
+std::vector<Anchor> ShellPgaModel::anchorsOf(const MarkerSet& markers) const {
+  std::vector<Anchor> anchors;
+  for (std::size_t l = 0; l < markers.markers.size(); ++l) {
+    const auto& marker = markers.markers[l];
+    const std::string field = "markers[" + std::to_string(l) + "] (" + marker.label + ")";
+    Eigen::Vector3d skin;
+    if (marker.vertex >= 0) {
+      Anchor anchor = anchorOfVertex(marker.vertex, field);
+      if (marker.offset.isZero()) {
+        anchors.push_back(anchor);
+        continue;
+      }
+      skin = parts_.template_shape.row(marker.vertex);
+      const Eigen::Vector3d barycentric = anchor.barycentric;
+      anchors.push_back(makeAnchor(parts_.coarsening.coarse->faces(), coarse_template_, anchor.face, barycentric,
+                                   skin + marker.offset));
+      continue;
+    }
+    if (marker.face < 0 || marker.face >= topology().faces().rows())
+      throw InvalidInput(field, "face " + std::to_string(marker.face) + " is outside [0, " +
+                                    std::to_string(topology().faces().rows()) + ")");
+    skin.setZero();
+    for (int c = 0; c < 3; ++c)
+      skin += marker.barycentric[c] * parts_.template_shape.row(topology().faces()(marker.face, c)).transpose();
+    Anchor anchor = anchorOfPoint(skin);
+    anchors.push_back(makeAnchor(parts_.coarsening.coarse->faces(), coarse_template_, anchor.face,
+                                 Eigen::Vector3d(anchor.barycentric), skin + marker.offset));
+  }
+  return anchors;
+}
+
+const ShellStructurePtr& ShellPgaModel::fineStructure() const {
+  std::call_once(fine_once_, [this] { fine_structure_ = std::make_shared<ShellStructure>(parts_.topology); });
+  return fine_structure_;
+}
+
+}  // namespace shaped

@@ -1,0 +1,104 @@
+#include "core/model/shell_pga_training.h"
+
+#include "core/mesh/alignment.h"
+#include "core/mesh/quality.h"
+#include "core/numerics/error.h"
+#include "core/shell/energy.h"
+
+namespace shaped {
+namespace {
+
+void requireShapes(const ShellPgaTrainingSet& set) {
+  requireOneComponent(*set.topology, "topology");
+  if (set.shapes.size() < 2)
+    throw InvalidInput("shapes", "has " + std::to_string(set.shapes.size()) + ", a model needs at least two training shapes");
+  for (std::size_t i = 0; i < set.shapes.size(); ++i)
+    requireValidShape(*set.topology, set.shapes[i], "shapes[" + std::to_string(i) + "]");
+  if (set.template_shape) requireValidShape(*set.topology, *set.template_shape, "template");
+}
+
+/// Two shapes alike up to a rigid motion carry no second observation and leave the Gram matrix without meaning.
+void requireDistinct(const std::vector<Vertices>& coarse) {
+  const double size = boundingBoxDiagonal(coarse.front());
+  for (std::size_t i = 0; i < coarse.size(); ++i)
+    for (std::size_t j = 0; j < i; ++j)
+      if (rmsVertexDistance(apply(alignRigidly(coarse[i], coarse[j]), coarse[i]), coarse[j]) < 1e-7 * size)
+        throw InvalidInput("shapes[" + std::to_string(i) + "]",
+                           "is shapes[" + std::to_string(j) + "] up to a rigid motion; remove one of them");
+}
+
+/// The training shape nearest to the mean lends its detail.
+std::size_t nearestToMean(const GeodesicCalculus& calculus, const Spider& spider) {
+  std::size_t nearest = 0;
+  double least = std::numeric_limits<double>::infinity();
+  for (std::size_t i = 0; i < spider.arms.size(); ++i) {
+    const double energy = calculus.pathEnergy(spider.arms[i]);
+    if (energy < least) least = energy, nearest = i;
+  }
+  return nearest;
+}
+
+ProgressSink within(const ProgressSink& sink, double from, double to) {
+  if (!sink) return {};
+  return [sink, from, to](const Progress& p) { sink({p.stage, from + (to - from) * p.fraction, p.residual}); };
+}
+
+void report(const ProgressSink& sink, const std::string& stage, double fraction) {
+  if (sink) sink({stage, fraction, 0});
+}
+
+}  // namespace
+
+std::optional<std::string> ShellPgaTrainingOptions::firstViolation(int training_shapes) const {
+  if (modes < 1 || modes > training_shapes - 1)
+    return "modes = " + std::to_string(modes) + ", want 1 to " + std::to_string(training_shapes - 1) +
+           ", one less than the " + std::to_string(training_shapes) + " training shapes";
+  if (path_steps < 1) return "path_steps = " + std::to_string(path_steps) + ", want >= 1";
+  if (bending && !(*bending > 0)) return "bending = " + std::to_string(*bending) + ", want > 0";
+  if (coarse_vertices < 50) return "coarse_vertices = " + std::to_string(coarse_vertices) + ", want >= 50";
+  if (!(tolerance > 0)) return "tolerance = " + std::to_string(tolerance) + ", want > 0";
+  if (iterations < 1) return "iterations = " + std::to_string(iterations) + ", want >= 1";
+  return std::nullopt;
+}
+
+Solved<ShellPgaModelPtr> trainShellPga(const ShellPgaTrainingSet& set, const ShellPgaTrainingOptions& options,
+                                       const ProgressSink& progress, std::stop_token stop) {
+  requireShapes(set);
+  if (const auto violation = options.firstViolation(static_cast<int>(set.shapes.size())))
+    throw InvalidInput("options", *violation);
+
+  report(progress, "coarsening", 0);
+  ShellPgaParts parts;
+  parts.topology = set.topology;
+  parts.template_shape = set.template_shape.value_or(set.shapes.front());
+  parts.bending = options.bending.value_or(defaultBending(set.shapes.front()));
+  parts.coarsening = coarsen(set.topology, set.shapes, {options.coarse_vertices, {}, stop});
+  const Outcome cancelled{Termination::kCancelled, 0, 0};
+  if (stop.stop_requested()) return {nullptr, cancelled};
+  std::vector<Vertices> coarse;
+  for (std::size_t i = 0; i < set.shapes.size(); ++i) {
+    coarse.push_back(restrictTo(parts.coarsening, set.shapes[i]));
+    requireValidShape(*parts.coarsening.coarse, coarse.back(), "shapes[" + std::to_string(i) + "] on the coarse mesh");
+  }
+  requireDistinct(coarse);
+
+  const GeodesicCalculus calculus(std::make_shared<ShellStructure>(parts.coarsening.coarse), parts.bending);
+  const auto spider = frechetMean(calculus, coarse, {options.path_steps, options.iterations, options.tolerance, stop,
+                                                     within(progress, 0.1, 0.75)});
+  parts.training = {static_cast<int>(set.shapes.size()), spider, {}, 0};
+  if (stop.stop_requested()) return {nullptr, cancelled};
+  report(progress, "principal variations", 0.75);
+  auto pga = principalVariations(calculus, spider.solution, options.modes, {100, 1e-8, stop});
+  if (stop.stop_requested()) return {nullptr, cancelled};
+  parts.training.variations = pga;
+  parts.pga = std::move(pga.solution);
+
+  report(progress, "prolongation", 0.9);
+  parts.reference = set.shapes[nearestToMean(calculus, spider.solution)];
+  parts.detail = Prolongation(set.topology, parts.coarsening, parts.reference, set.shapes).detail();
+  const Outcome outcome = parts.training.combined();
+  report(progress, "done", 1);
+  return {std::make_shared<const ShellPgaModel>(std::move(parts)), outcome};
+}
+
+}  // namespace shaped
