@@ -1,0 +1,82 @@
+#include "core/mesh/prolongation.h"
+
+#include <algorithm>
+#include <functional>
+#include <string>
+
+#include "core/mesh/learned_detail.h"
+#include "core/mesh/surface_neighbours.h"
+#include "core/numerics/error.h"
+
+namespace shaped {
+namespace {
+
+constexpr int kLearningNeighbours = 16;
+constexpr int kPlateNeighbours = 7;
+
+void checkCoarsening(const Topology& fine, const Coarsening& coarsening) {
+  const auto& kept = coarsening.kept;
+  if (!coarsening.coarse || static_cast<std::size_t>(coarsening.coarse->vertexCount()) != kept.size())
+    throw InvalidInput("coarsening", "names another number of kept vertices than its topology has");
+  if (!std::is_sorted(kept.begin(), kept.end(), std::less_equal<>()) || kept.front() < 0 ||
+      kept.back() >= fine.vertexCount())
+    throw InvalidInput("coarsening",
+                       "kept vertices must ascend within [0, " + std::to_string(fine.vertexCount()) + ")");
+  std::vector<char> met(static_cast<std::size_t>(fine.componentCount()), 0);
+  for (const auto v : kept) met[fine.components()[v]] = 1;
+  if (const auto missing = std::find(met.begin(), met.end(), 0); missing != met.end())
+    throw InvalidInput("coarsening",
+                       "keeps no vertex of component " + std::to_string(missing - met.begin()) + " of the fine mesh");
+}
+
+void checkTraining(const Topology& fine, const std::vector<Vertices>& training) {
+  for (std::size_t s = 0; s < training.size(); ++s)
+    requireValidShape(fine, training[s], "training[" + std::to_string(s) + "]");
+}
+
+/// Rotations and scale do not matter to the fit, but digits do: brings a sample to the origin.
+DetailSample sampleOf(const Vertices& shape, const Coarsening& coarsening, const ThinPlate& plate) {
+  const Vertices centred = shape.rowwise() - shape.colwise().mean();
+  DetailSample sample{frameVectors(coarsening.coarse->faces(), restrictTo(coarsening, centred)), {}};
+  sample.missing = centred - plate.solve(sample.frame);
+  return sample;
+}
+
+}  // namespace
+
+Prolongation::Prolongation(const TopologyPtr& fine, Coarsening coarsening, const Vertices& reference,
+                           const std::vector<Vertices>& training)
+    : coarsening_(std::move(coarsening)) {
+  checkCoarsening(*fine, coarsening_);
+  requireValidShape(*fine, reference, "reference");
+  checkTraining(*fine, training);
+  const auto neighbours = nearestMarked(*fine, reference, coarsening_.kept, kLearningNeighbours);
+  plate_ = std::make_shared<const ThinPlate>(*fine, coarsening_, reference, neighbours);
+  std::vector<DetailSample> samples;
+  for (const auto& shape : training) samples.push_back(sampleOf(shape, coarsening_, *plate_));
+  detail_ = fitDetail(neighbours, sampleOf(reference, coarsening_, *plate_), samples);
+}
+
+Prolongation::Prolongation(const TopologyPtr& fine, Coarsening coarsening, const Vertices& reference, SparseRows detail)
+    : coarsening_(std::move(coarsening)), detail_(std::move(detail)) {
+  checkCoarsening(*fine, coarsening_);
+  requireValidShape(*fine, reference, "reference");
+  if (detail_.rows() != fine->vertexCount() || detail_.cols() != 2 * coarsening_.coarse->vertexCount())
+    throw InvalidInput("detail", "is " + std::to_string(detail_.rows()) + " x " + std::to_string(detail_.cols()) +
+                                     ", want " + std::to_string(fine->vertexCount()) + " x " +
+                                     std::to_string(2 * coarsening_.coarse->vertexCount()));
+  const auto neighbours = nearestMarked(*fine, reference, coarsening_.kept, kPlateNeighbours);
+  plate_ = std::make_shared<const ThinPlate>(*fine, coarsening_, reference, neighbours);
+}
+
+Vertices Prolongation::prolongate(const Vertices& coarse) const {
+  if (coarse.rows() != coarsening_.coarse->vertexCount())
+    throw InvalidInput("coarse", "has " + std::to_string(coarse.rows()) + " vertices, want " +
+                                     std::to_string(coarsening_.coarse->vertexCount()));
+  if (!coarse.allFinite()) throw InvalidInput("coarse", "has a coordinate that is not a finite number");
+  const Eigen::RowVector3d centre = coarse.colwise().mean();
+  const Vertices frame = frameVectors(coarsening_.coarse->faces(), coarse.rowwise() - centre);
+  return (plate_->solve(frame) + detail_ * frame).rowwise() + centre;
+}
+
+}  // namespace shaped

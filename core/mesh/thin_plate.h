@@ -1,0 +1,40 @@
+#pragma once
+
+#include <Eigen/SparseCholesky>
+#include <Eigen/SparseCore>
+
+#include "core/mesh/coarse_frame.h"
+#include "core/mesh/coarsening.h"
+#include "core/mesh/surface_neighbours.h"
+
+namespace shaped {
+
+using SparseRows = Eigen::SparseMatrix<double, Eigen::RowMajor>;
+
+/// The fine shape whose Laplacian is the reference's, turned and stretched as the coarse shape around it was, and which
+/// passes through the coarse vertices: argmin over x of |L x - d|^2 in M^-1, x = c on the kept vertices.
+///
+/// L: cotangent Laplacian of the reference (weights clamped to [0.05, 5]), M its lumped areas. d is the Laplacian of
+/// the reference's edges, each mapped by the gradients (gradientStencils) of the coarse vertices around it, blended by
+/// weights 1/distance - 1/radius over the six nearest along the surface. All of it is linear in the frame vectors, so
+/// one factorisation serves every shape.
+///
+/// Minimising |L x - d| rather than solving L x = d is what keeps the surface smooth at the kept vertices: with them as
+/// hard constraints, the Poisson solution has a cusp at each (half as much error again on held-out bodies).
+class ThinPlate {
+ public:
+  /// neighbours: of each fine vertex among the kept ones, seven or more where the mesh has as many.
+  /// Throws InvalidInput naming `reference` when its triangles are too thin to factorise.
+  ThinPlate(const Topology& fine, const Coarsening& coarsening, const Vertices& reference,
+            const std::vector<SurfaceNeighbours>& neighbours);
+
+  /// frame: frameVectors of a coarse shape. V x 3. May be called from several threads at once.
+  Vertices solve(const Vertices& frame) const;
+
+ private:
+  std::vector<std::int32_t> kept_, free_;  ///< fine vertices
+  SparseRows pull_;                        ///< free x 2C: the right-hand side from the frame vectors
+  Eigen::SimplicialLDLT<Eigen::SparseMatrix<double>> factor_;
+};
+
+}  // namespace shaped
