@@ -6,6 +6,8 @@
 #include <algorithm>
 #include <limits>
 
+#include "core/mesh/quality.h"
+
 namespace shaped {
 namespace {
 
@@ -65,23 +67,9 @@ struct RayScene::Embree {
   Embree& operator=(const Embree&) = delete;
 };
 
-Vertices vertexNormals(const Vertices& vertices, const Faces& faces) {
-  Vertices normals = Vertices::Zero(vertices.rows(), 3);
-  for (Eigen::Index f = 0; f < faces.rows(); ++f) {
-    const Eigen::RowVector3d a = vertices.row(faces(f, 0));
-    const Eigen::RowVector3d b = vertices.row(faces(f, 1)), c = vertices.row(faces(f, 2));
-    for (int corner = 0; corner < 3; ++corner) normals.row(faces(f, corner)) += (b - a).cross(c - a);
-  }
-  for (Eigen::Index v = 0; v < normals.rows(); ++v) {
-    const double length = normals.row(v).norm();
-    if (length > 0) normals.row(v) /= length;
-  }
-  return normals;
-}
-
 RayScene::RayScene(const Vertices& vertices, const Faces& faces)
     : vertices_(vertices),
-      normals_(vertexNormals(vertices, faces)),
+      normals_(vertexNormals(faces, vertices)),
       faces_(faces),
       radius_(0.5 * (vertices.colwise().maxCoeff() - vertices.colwise().minCoeff()).norm()),
       floor_(vertices.col(1).minCoeff()),

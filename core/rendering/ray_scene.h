@@ -47,7 +47,4 @@ class RayScene {
   std::unique_ptr<Embree> embree_;
 };
 
-/// Unit vertex normals, V x 3: the mean of the adjacent face normals weighted by area; zero where they cancel out.
-Vertices vertexNormals(const Vertices& vertices, const Faces& faces);
-
 }  // namespace shaped

@@ -11,7 +11,7 @@ namespace shaped {
 /// shadow.
 struct Lighting {
   Eigen::Vector3d key_direction;  ///< unit, towards the light
-  int sky_rays = 6;               ///< per sample, >= 1
+  int sky_rays = 8;               ///< per sample, >= 1
   bool ground = true;             ///< a soft shadow on the plane below the mesh
 };
 
