@@ -14,14 +14,16 @@ find_package(PNG REQUIRED)
 find_package(OpenMP REQUIRED COMPONENTS CXX)  # only to limit the team inside CHOLMOD
 find_package(OpenSSL REQUIRED)
 
-# SuiteSparse and METIS come without CMake packages in Debian 12.
-find_path(SUITESPARSE_INCLUDE_DIR cholmod.h PATH_SUFFIXES suitesparse REQUIRED)
-find_library(CHOLMOD_LIBRARY cholmod REQUIRED)
-find_path(METIS_INCLUDE_DIR metis.h REQUIRED)
-find_library(METIS_LIBRARY metis REQUIRED)
-add_library(shaped_suitesparse INTERFACE)
-target_include_directories(shaped_suitesparse SYSTEM INTERFACE ${SUITESPARSE_INCLUDE_DIR} ${METIS_INCLUDE_DIR})
-target_link_libraries(shaped_suitesparse INTERFACE ${CHOLMOD_LIBRARY} ${METIS_LIBRARY})
+# SuiteSparse and METIS come without CMake packages in Debian 12. Without the supernodal module neither is linked, nor its licence.
+if(SHAPED_SUPERNODAL)
+  find_path(SUITESPARSE_INCLUDE_DIR cholmod.h PATH_SUFFIXES suitesparse REQUIRED)
+  find_library(CHOLMOD_LIBRARY cholmod REQUIRED)
+  find_path(METIS_INCLUDE_DIR metis.h REQUIRED)
+  find_library(METIS_LIBRARY metis REQUIRED)
+  add_library(shaped_suitesparse INTERFACE)
+  target_include_directories(shaped_suitesparse SYSTEM INTERFACE ${SUITESPARSE_INCLUDE_DIR} ${METIS_INCLUDE_DIR})
+  target_link_libraries(shaped_suitesparse INTERFACE ${CHOLMOD_LIBRARY} ${METIS_LIBRARY})
+endif()
 
 if(SHAPED_TESTS)
   find_package(Catch2 2 CONFIG REQUIRED)
