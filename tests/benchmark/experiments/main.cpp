@@ -1,0 +1,43 @@
+// The measured table on the real data: shaped_experiments ROW..., for example "shaped_experiments 0 2 3". Each row
+// prints a section of RESULTS.md. Environment: SHAPED_DATA, the folder of the real data; SHAPED_ORACLES, the folder of
+// shell_energy.json (default: SHAPED_DATA/oracles); SHAPED_EXPERIMENTS_CACHE, where trained models are kept (default:
+// ~/.cache/shaped-experiments). Exit code 77 when the data is not there, 2 for a row that does not exist.
+
+#include <cstdio>
+#include <functional>
+#include <map>
+
+#include "core/numerics/threads.h"
+#include "tests/benchmark/experiments/data.h"
+#include "tests/benchmark/experiments/experiment.h"
+
+using namespace shaped::experiments;
+
+int main(int argc, char** argv) {
+  const std::map<std::string, std::function<void()>> rows = {
+      {"0", row0Oracles},       {"2", row2Geodesics},     {"3", row3GeodesicTime},   {"4", row4PathSteps},
+      {"5", row5Training},      {"6", row6Projection},    {"7", row7Generalisation}, {"9", row9VirtualTrials},
+      {"10", row10HandleEdits}, {"11", row11RigidMotions}};
+  shaped::limitLibraryThreads();
+  if (argc < 2) {
+    std::fprintf(stderr, "usage: shaped_experiments ROW...   rows: 0 2 3 4 5 6 7 9 10 11\n");
+    return 2;
+  }
+  for (int i = 1; i < argc; ++i) {
+    const auto row = rows.find(argv[i]);
+    if (row == rows.end()) {
+      std::fprintf(stderr, "there is no row '%s'; rows: 0 2 3 4 5 6 7 9 10 11\n", argv[i]);
+      return 2;
+    }
+    try {
+      row->second();
+    } catch (const MissingData& missing) {
+      std::fprintf(stderr, "row %s skipped: %s\n", argv[i], missing.what());
+      return 77;
+    } catch (const std::exception& error) {
+      std::fprintf(stderr, "row %s failed: %s\n", argv[i], error.what());
+      return 1;
+    }
+  }
+  return 0;
+}
