@@ -26,7 +26,7 @@ class BalanceSolver {
     else
       addFirstGradient(topology_, current_measures_, neighbour, bending_, 1, gradient);
     known_ = pullBack(gradient);
-    floor_ = forceFloor(current_measures_);
+    floor_ = forceFloor(topology_, current_, current_measures_, bending_);
     factoriseMetric();
   }
 

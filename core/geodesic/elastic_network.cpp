@@ -88,6 +88,7 @@ double NetworkNewton::nodeGradient(std::size_t n) {
   const auto self = static_cast<std::size_t>(node.index);
   Vertices total = Vertices::Zero(network_.nodes[self].rows(), 3), force(total.rows(), 3);
   MeasureGradient measures(topology_);
+  const double floor = forceFloor(topology_, network_.nodes[self], measures_[self], bending_);
   double scale = 0;
   for (const auto s : node.segments) {
     const auto& segment = network_.segments[static_cast<std::size_t>(s)];
@@ -99,7 +100,7 @@ double NetworkNewton::nodeGradient(std::size_t n) {
                                                    segment.weight, measures);
     pullBackGradient(topology_, network_.nodes[self], measures, force);
     total += force;
-    scale += force.norm() + segment.weight * forceFloor(measures_[self]);
+    scale += force.norm() + segment.weight * floor;
   }
   gradient_[n] = flatten(total);
   pins_[n] = gaugePins(network_.nodes[self]);

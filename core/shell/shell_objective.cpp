@@ -1,5 +1,8 @@
 #include "core/shell/shell_objective.h"
 
+#include <algorithm>
+#include <cmath>
+
 namespace shaped {
 
 ShellObjective::ShellObjective(ShellStructurePtr structure, double bending)
@@ -63,7 +66,7 @@ double ShellObjective::measureReferenceNorm() const {
     addFirstGradient(topology, measures_, term.measures, bending_, term.weight, measures);
     add(measures, term.weight);
   }
-  return sum + weights * forceFloor(measures_);
+  return sum + weights * forceFloor(topology, shape_, measures_, bending_);
 }
 
 void ShellObjective::hessian(const Eigen::VectorXd& x, bool projected, SymmetricBlockMatrix& hessian) {
@@ -84,6 +87,25 @@ Solved<Vertices> minimiseShell(ShellObjective& objective, const ShellStructure& 
   return {unflatten(solved.solution), solved};
 }
 
-double forceFloor(const ShellMeasures& measures) { return 1e-8 * std::sqrt(measures.area.sum()); }
+double forceFloor(const Topology& topology, const Vertices& shape, const ShellMeasures& measures, double bending) {
+  constexpr double rounding = 1e-15;
+  const double reach = shape.cwiseAbs().maxCoeff();
+  double sum = 0;
+  for (std::size_t f = 0; f < topology.faceEdges().size(); ++f) {
+    double longest = 0;  // squared
+    for (const auto edge : topology.faceEdges()[f]) longest = std::max(longest, measures.squared_length[edge]);
+    const double slimness = longest / measures.area[static_cast<Eigen::Index>(f)];
+    const double noise = 0.5 * reach * slimness + 0.05 * std::sqrt(longest) * slimness * slimness;
+    sum += noise * noise;
+  }
+  for (const auto& hinge : topology.hinges()) {
+    const double squared = measures.squared_length[hinge.edges[0]];
+    const double one = measures.area[hinge.faces[0]], two = measures.area[hinge.faces[1]];
+    // |e|^2 / S times the squared slopes of the angle, 1 / height^2 on either side
+    const double noise = bending * reach * squared / (one + two) * squared / 4 * (1 / (one * one) + 1 / (two * two));
+    sum += noise * noise;
+  }
+  return 1e8 * rounding * std::sqrt(sum);
+}
 
 }  // namespace shaped

@@ -53,14 +53,18 @@ class ShellObjective : public NewtonObjective {
 };
 
 /// The flat vector of a shape's coordinates and back.
-inline Eigen::VectorXd flatten(const Vertices& shape) { return Eigen::Map<const Eigen::VectorXd>(shape.data(), shape.size()); }
+inline Eigen::VectorXd flatten(const Vertices& shape) {
+  return Eigen::Map<const Eigen::VectorXd>(shape.data(), shape.size());
+}
 inline Vertices unflatten(const Eigen::VectorXd& x) { return Eigen::Map<const Vertices>(x.data(), x.size() / 3, 3); }
 
 /// Minimises the objective from `start`, V x 3.
 Solved<Vertices> minimiseShell(ShellObjective& objective, const ShellStructure& structure, const Vertices& start,
                                const NewtonOptions& options);
 
-/// Reference forces are never taken smaller than this: a relative strain of about 1e-8, where rounding begins.
-double forceFloor(const ShellMeasures& measures);
+/// Reference forces are never taken smaller than this, so that equal shapes, whose forces are rounding alone, count as
+/// balanced: 1e8 times the force that rounding leaves at equilibrium [m]. Positions carry 16 digits of their distance
+/// from the origin, stiff thin triangles turn the rest into forces, and their areas lose digits.
+double forceFloor(const Topology& topology, const Vertices& shape, const ShellMeasures& measures, double bending);
 
 }  // namespace shaped

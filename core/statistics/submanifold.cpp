@@ -11,7 +11,9 @@
 namespace shaped {
 namespace {
 
-GeodesicOptions geodesicOptions(const SubmanifoldOptions& options) { return {100, options.shape_tolerance, options.stop}; }
+GeodesicOptions geodesicOptions(const SubmanifoldOptions& options) {
+  return {100, options.shape_tolerance, options.stop};
+}
 
 double shellDistance(const Topology& topology, const ShellMeasures& a, const ShellMeasures& b, double bending) {
   return std::sqrt(std::max(shellEnergy(topology, a, b, bending), 0.0));
@@ -35,10 +37,11 @@ Submanifold::Submanifold(std::shared_ptr<const GeodesicCalculus> calculus, std::
     : calculus_(std::move(calculus)), pga_(std::move(pga)), distances_(pga_->modes()), forces_(2 * pga_->modes()) {
   const auto mean = measure(calculus_->topology(), pga_->mean);
   const auto pins = gaugePins(pga_->mean);
+  const double floor = forceFloor(calculus_->topology(), pga_->mean, mean, calculus_->bending());
   for (const auto& variation : pga_->variations) {
     const auto index = static_cast<Eigen::Index>(measures_.size());
     measures_.push_back(measure(calculus_->topology(), variation));
-    forces_[index] = secondForce(*calculus_, measures_.back(), pga_->mean, mean, pins).norm() + forceFloor(mean);
+    forces_[index] = secondForce(*calculus_, measures_.back(), pga_->mean, mean, pins).norm() + floor;
     if (index < pga_->modes())
       distances_[index] = shellDistance(calculus_->topology(), mean, measures_.back(), calculus_->bending());
   }
@@ -67,9 +70,9 @@ Solved<Vertices> Submanifold::average(const Eigen::VectorXd& alpha, const Vertic
 /// The local projection (18) at one point: the derivative of q(alpha) by the implicit function theorem (27)-(29), and
 /// the Gauss-Newton model of W[s_loc, q(alpha)] that follows from it.
 struct Submanifold::LocalProjection {
-  Eigen::MatrixXd response;  ///< dq/dalpha, 3V x m
-  Eigen::VectorXd gradient;  ///< of W[s_loc, q(alpha)], m
-  Eigen::MatrixXd curvature; ///< m x m, positive semi-definite
+  Eigen::MatrixXd response;   ///< dq/dalpha, 3V x m
+  Eigen::VectorXd gradient;   ///< of W[s_loc, q(alpha)], m
+  Eigen::MatrixXd curvature;  ///< m x m, positive semi-definite
 
   LocalProjection(const Submanifold& owner, const ShellMeasures& target, const std::vector<std::size_t>& vertices,
                   const Eigen::VectorXd& alpha, const Vertices& q) {
@@ -81,7 +84,8 @@ struct Submanifold::LocalProjection {
 
     AverageEnergy energy(calculus.topology());
     for (Eigen::Index j = 0; j < m; ++j)
-      energy.add(calculus.topology(), owner.measures_[vertices[static_cast<std::size_t>(j)]], calculus.bending(), alpha[j]);
+      energy.add(calculus.topology(), owner.measures_[vertices[static_cast<std::size_t>(j)]], calculus.bending(),
+                 alpha[j]);
     SymmetricBlockMatrix hessian(structure.pattern());
     CholeskyFactor factor(structure.analysis());
     bool factorised = false;
@@ -122,14 +126,16 @@ struct Submanifold::LocalProjection {
   }
 };
 
-Solved<SubmanifoldPoint> Submanifold::optimiseWeights(const ShellMeasures& target, const std::vector<std::size_t>& vertices,
-                                                      Eigen::VectorXd alpha, const SubmanifoldOptions& options,
-                                                      Vertices& q, double& energy) const {
+Solved<SubmanifoldPoint> Submanifold::optimiseWeights(const ShellMeasures& target,
+                                                      const std::vector<std::size_t>& vertices, Eigen::VectorXd alpha,
+                                                      const SubmanifoldOptions& options, Vertices& q,
+                                                      double& energy) const {
   const auto& topology = calculus_->topology();
   const double size = shellEnergy(topology, measure(topology, pga_->mean), target, calculus_->bending());
   const auto spread = [&](const Eigen::VectorXd& used) {
     Eigen::VectorXd all = Eigen::VectorXd::Zero(forces_.size());
-    for (std::size_t j = 0; j < vertices.size(); ++j) all[static_cast<Eigen::Index>(vertices[j])] = used[static_cast<Eigen::Index>(j)];
+    for (std::size_t j = 0; j < vertices.size(); ++j)
+      all[static_cast<Eigen::Index>(vertices[j])] = used[static_cast<Eigen::Index>(j)];
     return all;
   };
   const auto evaluate = [&](const Vertices& shape) {
@@ -171,7 +177,8 @@ Solved<SubmanifoldProjection> Submanifold::project(const Vertices& shape, const 
                                                    const SubmanifoldProjection* warm) const {
   const auto vertices = vertexIndices(options.modes);
   const auto geodesic_options = geodesicOptions(options);
-  auto path = calculus_->interpolate(pga_->mean, shape, pga_->path_steps, geodesic_options, warm ? warm->geodesic : Path{});
+  auto path =
+      calculus_->interpolate(pga_->mean, shape, pga_->path_steps, geodesic_options, warm ? warm->geodesic : Path{});
   Outcome outcome = path;
   SubmanifoldProjection result;
   const double distance = calculus_->distance(path.solution);
@@ -221,7 +228,8 @@ Solved<Vertices> Submanifold::rescale(const Vertices& local, double factor, cons
 
 Solved<Vertices> Submanifold::shapeOf(const SubmanifoldPoint& point, const SubmanifoldOptions& options) const {
   if (point.alpha.size() != forces_.size())
-    throw InvalidInput("alpha", "has " + std::to_string(point.alpha.size()) + " entries, want " + std::to_string(forces_.size()));
+    throw InvalidInput(
+        "alpha", "has " + std::to_string(point.alpha.size()) + " entries, want " + std::to_string(forces_.size()));
   for (Eigen::Index j = 0; j < point.alpha.size(); ++j)
     if (!(point.alpha[j] >= 0)) throw InvalidInput("alpha[" + std::to_string(j) + "]", "is negative or not a number");
   if (!(std::abs(point.alpha.sum() - 1) < 1e-6))

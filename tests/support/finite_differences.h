@@ -1,0 +1,12 @@
+#pragma once
+
+#include <functional>
+
+#include "core/mesh/types.h"
+
+namespace shaped::test {
+
+/// Gradient of a function of a shape by central differences of fourth order, V x 3. step: in metres.
+Vertices differenceGradient(const std::function<double(const Vertices&)>& f, const Vertices& at, double step);
+
+}  // namespace shaped::test
