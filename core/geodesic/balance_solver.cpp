@@ -16,8 +16,14 @@ class BalanceSolver {
  public:
   BalanceSolver(const ShellStructure& structure, double bending, const Vertices& current, Unknown unknown,
                 const Vertices& known_neighbour)
-      : structure_(structure), topology_(structure.topology()), bending_(bending), unknown_(unknown), current_(current),
-        current_measures_(measure(topology_, current)), pins_(gaugePins(current)), metric_(structure.analysis()),
+      : structure_(structure),
+        topology_(structure.topology()),
+        bending_(bending),
+        unknown_(unknown),
+        current_(current),
+        current_measures_(measure(topology_, current)),
+        pins_(gaugePins(current)),
+        metric_(structure.analysis()),
         mixed_(structure.pattern()) {
     const auto neighbour = measure(topology_, known_neighbour);
     MeasureGradient gradient(topology_);
@@ -32,6 +38,11 @@ class BalanceSolver {
 
   /// Newton's method on known * amount + force(x) = 0; false when it does not reach the tolerance.
   bool solve(double amount, Vertices& x, const GeodesicOptions& options, Outcome& outcome);
+  /// Of the whole equation at x.
+  double residual(const Vertices& x) const {
+    const Eigen::VectorXd own = force(x);
+    return (own + known_).norm() / (own.norm() + known_.norm() + floor_);
+  }
   const Vertices& current() const { return current_; }
 
  private:
@@ -158,6 +169,10 @@ Solved<Vertices> solveBalance(BalanceSolver solver, const Vertices& start, const
     if (outcome.termination == Termination::kCancelled) break;
     stage *= 0.5;
     if (stage < 1e-3) break;
+  }
+  if (reached < 1) {
+    if (outcome.termination == Termination::kNumericalFailure) here = start;
+    outcome.residual = solver.residual(here);
   }
   return {here, outcome};
 }
