@@ -4,8 +4,8 @@
 
 #include <algorithm>
 #include <cmath>
-#include <numeric>
 #include <memory>
+#include <numeric>
 
 #include "core/geodesic/network_tree.h"
 #include "core/numerics/newton.h"
@@ -35,9 +35,16 @@ void forEach(std::size_t count, const Body& body) {
 /// Newton's method on a network: the state at one iterate and the linear algebra over its tree.
 class NetworkNewton {
  public:
-  NetworkNewton(const ShellStructurePtr& structure, double bending, ElasticNetwork network)
-      : structure_(structure), topology_(structure->topology()), bending_(bending), network_(std::move(network)),
-        tree_(network_), measures_(network_.nodes.size()), pins_(tree_.nodes.size()), gradient_(tree_.nodes.size()) {
+  NetworkNewton(const ShellStructurePtr& structure, double bending, ElasticNetwork network, std::stop_token stop)
+      : structure_(structure),
+        topology_(structure->topology()),
+        bending_(bending),
+        stop_(std::move(stop)),
+        network_(std::move(network)),
+        tree_(network_),
+        measures_(network_.nodes.size()),
+        pins_(tree_.nodes.size()),
+        gradient_(tree_.nodes.size()) {
     forEach(network_.nodes.size(), [&](std::size_t n) { measure(topology_, network_.nodes[n], measures_[n]); });
     for (const auto& segment : network_.segments)
       noise_ += 1e-14 * segment.weight * measures_[static_cast<std::size_t>(segment.from)].area.sum();
@@ -46,12 +53,14 @@ class NetworkNewton {
       factors_.emplace_back(structure_->analysis());
     }
     for (std::size_t n = 0; n < tree_.nodes.size(); ++n)
-      couplings_.push_back(tree_.nodes[n].parent < 0 ? nullptr : std::make_unique<GeneralBlockMatrix>(structure_->pattern()));
+      couplings_.push_back(tree_.nodes[n].parent < 0 ? nullptr
+                                                     : std::make_unique<GeneralBlockMatrix>(structure_->pattern()));
   }
 
   /// Gradients of all free nodes; the largest relative imbalance.
   double updateGradient();
-  /// Hessian, couplings and preconditioner; false when a node's block cannot be factorised.
+  /// Hessian, couplings and preconditioner; false when a node's block cannot be factorised. Left unfinished when the
+  /// stop token fires, as is the direction.
   bool updateHessian();
   NodeVectors findDirection(double forcing) const;
   bool step(const NodeVectors& direction);
@@ -72,6 +81,7 @@ class NetworkNewton {
   ShellStructurePtr structure_;
   const Topology& topology_;
   double bending_;
+  std::stop_token stop_;
   ElasticNetwork network_;
   NetworkTree tree_;
   std::vector<ShellMeasures> measures_;
@@ -144,6 +154,7 @@ bool NetworkNewton::factoriseNode(std::size_t n) {
 bool NetworkNewton::updateHessian() {
   std::vector<char> done(tree_.nodes.size(), 1);
   forEach(tree_.nodes.size(), [&](std::size_t n) {
+    if (stop_.stop_requested()) return;
     done[n] = factoriseNode(n);
     if (!couplings_[n]) return;
     const auto& segment = network_.segments[static_cast<std::size_t>(tree_.nodes[n].parent_segment)];
@@ -169,8 +180,11 @@ void NetworkNewton::multiply(const NodeVectors& x, NodeVectors& y) const {
   forEach(x.size(), [&](std::size_t n) {
     y[n].setZero(x[n].size());
     hessians_[n].multiplyAdd(x[n].data(), y[n].data());
-    if (tree_.nodes[n].parent >= 0) coupleAdd(n, static_cast<std::size_t>(tree_.nodes[n].parent), 1, x[static_cast<std::size_t>(tree_.nodes[n].parent)], y[n]);
-    for (const auto child : tree_.nodes[n].children) coupleAdd(n, static_cast<std::size_t>(child), 1, x[static_cast<std::size_t>(child)], y[n]);
+    if (tree_.nodes[n].parent >= 0)
+      coupleAdd(n, static_cast<std::size_t>(tree_.nodes[n].parent), 1,
+                x[static_cast<std::size_t>(tree_.nodes[n].parent)], y[n]);
+    for (const auto child : tree_.nodes[n].children)
+      coupleAdd(n, static_cast<std::size_t>(child), 1, x[static_cast<std::size_t>(child)], y[n]);
     pins_[n].clear(y[n].data());
   });
 }
@@ -187,7 +201,8 @@ void NetworkNewton::precondition(const NodeVectors& r, NodeVectors& z) const {
     forEach(level->size(), [&](std::size_t i) {
       const auto n = static_cast<std::size_t>((*level)[i]);
       Eigen::VectorXd rhs = r[n];
-      for (const auto child : tree_.nodes[n].children) coupleAdd(n, static_cast<std::size_t>(child), -1, z[static_cast<std::size_t>(child)], rhs);
+      for (const auto child : tree_.nodes[n].children)
+        coupleAdd(n, static_cast<std::size_t>(child), -1, z[static_cast<std::size_t>(child)], rhs);
       pins_[n].clear(rhs.data());
       solveBlock(n, rhs, z[n]);
     });
@@ -214,7 +229,7 @@ NodeVectors NetworkNewton::findDirection(double forcing) const {
   p = z;
   double rz = dot(r, z);
   const double goal = forcing * forcing * rz;
-  for (int k = 0; k < kLimit && rz > goal; ++k) {
+  for (int k = 0; k < kLimit && rz > goal && !stop_.stop_requested(); ++k) {
     multiply(p, ap);
     const double curvature = dot(p, ap);
     if (!(curvature > 0)) return k == 0 ? p : x;
@@ -246,7 +261,8 @@ bool NetworkNewton::step(const NodeVectors& direction) {
   const auto moveTo = [&](double t) {
     forEach(direction.size(), [&](std::size_t n) {
       const auto index = static_cast<std::size_t>(tree_.nodes[n].index);
-      nodes[index] = network_.nodes[index] + t * Eigen::Map<const Vertices>(direction[n].data(), nodes[index].rows(), 3);
+      nodes[index] =
+          network_.nodes[index] + t * Eigen::Map<const Vertices>(direction[n].data(), nodes[index].rows(), 3);
       measure(topology_, nodes[index], measures[index]);
     });
     return energy(measures);
@@ -263,7 +279,8 @@ bool NetworkNewton::step(const NodeVectors& direction) {
 
 Solved<ElasticNetwork> relax(const ShellStructurePtr& structure, double bending, ElasticNetwork network,
                              const NetworkOptions& options) {
-  NetworkNewton run(structure, bending, std::move(network));
+  const auto start = network.nodes;
+  NetworkNewton run(structure, bending, std::move(network), options.stop);
   Outcome outcome;
   for (outcome.iterations = 0;; ++outcome.iterations) {
     outcome.residual = run.updateGradient();
@@ -278,11 +295,17 @@ Solved<ElasticNetwork> relax(const ShellStructurePtr& structure, double bending,
     if (options.stop.stop_requested()) break;
     outcome.termination = Termination::kNumericalFailure;
     if (!run.updateHessian()) break;
+    outcome.termination = Termination::kCancelled;
+    if (options.stop.stop_requested()) break;
     const double forcing = std::clamp(std::sqrt(outcome.residual), 1e-4, 0.1);
+    const auto direction = run.findDirection(forcing);
+    if (options.stop.stop_requested()) break;
     outcome.termination = Termination::kStalled;
-    if (!run.step(run.findDirection(forcing))) break;
+    if (!run.step(direction)) break;
   }
-  return {run.takeNetwork(), outcome};
+  auto result = run.takeNetwork();
+  if (outcome.termination == Termination::kNumericalFailure) result.nodes = start;
+  return {std::move(result), outcome};
 }
 
 std::vector<double> segmentEnergies(const Topology& topology, double bending, const ElasticNetwork& network) {

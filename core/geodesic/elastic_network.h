@@ -1,7 +1,7 @@
 #pragma once
 
-#include <stop_token>
 #include <functional>
+#include <stop_token>
 #include <vector>
 
 #include "core/numerics/solved.h"
@@ -40,9 +40,9 @@ struct NetworkOptions {
 /// iteration; a line search on the energy guards every step.
 ///
 /// The residual is, over free nodes, the largest ratio of the norm of the node's gradient to the sum of the norms of
-/// its segments' forces: 0 where the forces balance. Runs parallel loops over nodes in the current TBB arena; the result
-/// does not depend on the number of threads. Rigid motions of the free nodes stay as they were at the start up to the
-/// six unknowns pinned.
+/// its segments' forces: 0 where the forces balance. Runs parallel loops over nodes in the current TBB arena; the
+/// result does not depend on the number of threads. Cancellation is polled at every node's factorisation and every
+/// inner iteration. Rigid motions of the free nodes stay as they were at the start up to the six unknowns pinned.
 Solved<ElasticNetwork> relax(const ShellStructurePtr& structure, double bending, ElasticNetwork network,
                              const NetworkOptions& options);
 

@@ -20,7 +20,8 @@ Vertices aligned(const Vertices& shape, const Vertices& to) { return apply(align
 }  // namespace
 
 GeodesicCalculus::GeodesicCalculus(ShellStructurePtr structure, double bending)
-    : structure_(std::move(structure)), bending_(bending),
+    : structure_(std::move(structure)),
+      bending_(bending),
       reconstruction_(std::make_shared<LengthAngleReconstruction>(structure_->topologyPtr())) {}
 
 std::vector<double> GeodesicCalculus::segmentEnergies(const Path& path) const {
@@ -41,10 +42,11 @@ double GeodesicCalculus::pathEnergy(const Path& path) const {
 
 double GeodesicCalculus::distance(const Path& geodesic) const { return std::sqrt(std::max(pathEnergy(geodesic), 0.0)); }
 
-Path GeodesicCalculus::startPath(const Vertices& a, const Vertices& b, int steps) const {
+Path GeodesicCalculus::startPath(const Vertices& a, const Vertices& b, int steps, const std::stop_token& stop) const {
   const auto from = measure(topology(), a), to = measure(topology(), b);
   Path path{a};
   for (int k = 1; k < steps; ++k) {
+    if (stop.stop_requested()) return {};
     path.push_back(reconstruction_->reconstruct(blendMeasures(from, to, static_cast<double>(k) / steps), path.back()));
     if (path.back().rows() == 0) return {};
   }
@@ -57,11 +59,13 @@ Solved<Path> GeodesicCalculus::relaxPath(Path path, const GeodesicOptions& optio
   ElasticNetwork network{std::move(path), std::vector<bool>(static_cast<std::size_t>(count), true), {}};
   network.free.front() = network.free.back() = false;
   for (std::int32_t k = 0; k + 1 < count; ++k) network.segments.push_back({k, k + 1, static_cast<double>(count - 1)});
-  auto solved = relax(structure_, bending_, std::move(network), {options.max_iterations, options.tolerance, options.stop, {}});
+  auto solved =
+      relax(structure_, bending_, std::move(network), {options.max_iterations, options.tolerance, options.stop, {}});
   return {std::move(solved.solution.nodes), solved};
 }
 
-Solved<Path> GeodesicCalculus::cascade(const Vertices& a, const Vertices& b, int steps, const GeodesicOptions& options) const {
+Solved<Path> GeodesicCalculus::cascade(const Vertices& a, const Vertices& b, int steps,
+                                       const GeodesicOptions& options) const {
   Path path{a, b};
   GeodesicOptions rough = options;
   rough.tolerance = std::max(options.tolerance, 1e-3);
@@ -86,8 +90,8 @@ Solved<Path> GeodesicCalculus::cascade(const Vertices& a, const Vertices& b, int
   return solved;
 }
 
-Solved<Path> GeodesicCalculus::interpolate(const Vertices& a, const Vertices& b, int steps, const GeodesicOptions& options,
-                                           const Path& warm) const {
+Solved<Path> GeodesicCalculus::interpolate(const Vertices& a, const Vertices& b, int steps,
+                                           const GeodesicOptions& options, const Path& warm) const {
   if (steps < 1) throw InvalidInput("path_steps", std::to_string(steps) + ", want >= 1");
   requireValidShape(topology(), a, "a");
   requireValidShape(topology(), b, "b");
@@ -106,7 +110,12 @@ Solved<Path> GeodesicCalculus::interpolate(const Vertices& a, const Vertices& b,
     }
   }
   const double direct = shellEnergy(topology(), a, b, bending_);
-  Path start = startPath(a, aligned(b, a), steps);
+  Path start = startPath(a, aligned(b, a), steps, options.stop);
+  if (options.stop.stop_requested()) {
+    Path untouched(static_cast<std::size_t>(steps), a);
+    untouched.push_back(b);
+    return {std::move(untouched), Outcome{Termination::kCancelled, 0, 1}};
+  }
   if (!start.empty() && pathEnergy(start) <= 2 * direct) {
     start.back() = b;
     auto solved = relaxPath(std::move(start), options);
@@ -115,7 +124,8 @@ Solved<Path> GeodesicCalculus::interpolate(const Vertices& a, const Vertices& b,
   return cascade(a, b, steps, options);
 }
 
-Solved<Vertices> GeodesicCalculus::between(const Vertices& a, const Vertices& b, double t, const GeodesicOptions& options) const {
+Solved<Vertices> GeodesicCalculus::between(const Vertices& a, const Vertices& b, double t,
+                                           const GeodesicOptions& options) const {
   const auto from = measure(topology(), a), to = measure(topology(), b);
   ShellObjective objective(structure_, bending_);
   objective.addUndeformed(from, 1 - t);
@@ -200,7 +210,8 @@ Solved<Vertices> GeodesicCalculus::at(const Path& path, double t, const Geodesic
   return {std::move(inner.solution), outcome};
 }
 
-Solved<Vertices> GeodesicCalculus::transport(const Path& path, const Vertices& displaced, const GeodesicOptions& options) const {
+Solved<Vertices> GeodesicCalculus::transport(const Path& path, const Vertices& displaced,
+                                             const GeodesicOptions& options) const {
   Vertices carried = displaced;
   Outcome outcome;
   for (std::size_t k = 0; k + 1 < path.size() && outcome.converged(); ++k) {

@@ -29,9 +29,9 @@ class GeodesicCalculus {
   const Topology& topology() const { return structure_->topology(); }
   double bending() const { return bending_; }
 
-  /// The discrete K-geodesic from a to b, the minimiser of the path energy (7): K + 1 shapes, the ends as given, K >= 1.
-  /// warm: a path with the same number of shapes whose inner ones start the iteration, or empty. Throws InvalidInput
-  /// when K < 1 or a shape does not fit the topology.
+  /// The discrete K-geodesic from a to b, the minimiser of the path energy (7): K + 1 shapes, the ends as given, K
+  /// >= 1. warm: a path with the same number of shapes whose inner ones start the iteration, or empty. Throws
+  /// InvalidInput when K < 1 or a shape does not fit the topology.
   Solved<Path> interpolate(const Vertices& a, const Vertices& b, int steps, const GeodesicOptions& options,
                            const Path& warm = {}) const;
 
@@ -40,7 +40,8 @@ class GeodesicCalculus {
   Solved<Vertices> extrapolate(const Vertices& previous, const Vertices& current, const GeodesicOptions& options) const;
 
   /// The shape before `current` where `next` follows: W,2[previous, current] + W,1[current, next] = 0.
-  Solved<Vertices> extrapolateBackwards(const Vertices& current, const Vertices& next, const GeodesicOptions& options) const;
+  Solved<Vertices> extrapolateBackwards(const Vertices& current, const Vertices& next,
+                                        const GeodesicOptions& options) const;
 
   /// I(a, b, t) for a K-geodesic from a to b and any real t: nodes at multiples of 1/K, (23) beyond the ends, (24)
   /// between nodes. t = -1 reflects b about a.
@@ -61,7 +62,7 @@ class GeodesicCalculus {
   Solved<Vertices> transport(const Path& path, const Vertices& displaced, const GeodesicOptions& options) const;
 
  private:
-  Path startPath(const Vertices& a, const Vertices& b, int steps) const;
+  Path startPath(const Vertices& a, const Vertices& b, int steps, const std::stop_token& stop) const;
   Solved<Path> cascade(const Vertices& a, const Vertices& b, int steps, const GeodesicOptions& options) const;
   Solved<Path> relaxPath(Path path, const GeodesicOptions& options) const;
   Vertices predict(const Vertices& previous, const Vertices& current) const;

@@ -111,6 +111,7 @@ Solved<Spider> frechetMean(const GeodesicCalculus& calculus, const std::vector<V
   const int steps = options.path_steps;
   Spider start = options.start ? *options.start : startSpider(calculus, shapes, options);
   for (std::size_t i = 0; i < shapes.size(); ++i) start.arms[i].back() = shapes[i];
+  if (options.stop.stop_requested()) return {std::move(start), Outcome{Termination::kCancelled, 0, 1}};
   NetworkOptions network_options{options.max_iterations, options.tolerance, options.stop, {}};
   if (options.progress)
     network_options.on_iteration = [&](int iteration, double residual) {
