@@ -25,8 +25,8 @@ struct CoarseningOptions {
 ///
 /// A collapse costs the summed quadric error of all shapes ([GH97], groupwise as in [MG03]; GroupQuadrics) times the
 /// square of the factor by which it lowers the smallest regularity of the surface around it (CollapseProbe). None
-/// changes the surface's genus, opens or closes a boundary, turns a triangle of any shape by more than 70 degrees, or
-/// leaves thin or folded triangles in a shape that was better there. Where that rule leaves no way to the target it is
+/// changes the surface's genus, opens or closes a boundary, turns a triangle of any shape by more than 70 degrees (unless
+/// it unfolds it), or leaves thin or folded triangles in a shape that was better there. Where that rule leaves no way to the target it is
 /// relaxed step by step; where nothing can be collapsed any more (or too many vertices are protected) the result has
 /// more vertices than asked for. A mesh with at most the target is kept whole. Same input, same result.
 ///

@@ -6,7 +6,9 @@ namespace {
 constexpr double kSmallestTurnCosine = 0.34;  ///< of 70 degrees
 constexpr double kSoundQuality = 0.2;
 constexpr double kSoundFold = 0.5;  ///< 1 + cosine of 120 degrees
-constexpr double kTiny = 1e-300;    ///< keeps a quotient of zeros finite
+constexpr double kPoorRegularity = 0.5;
+constexpr double kClearGain = 1.2;
+constexpr double kTiny = 1e-300;  ///< keeps a quotient of zeros finite
 
 auto regularity(const ShapeGroup::Values& quality, const ShapeGroup::Values& fold) {
   return (quality / kSoundQuality).min((1 + fold) / kSoundFold);
@@ -24,10 +26,11 @@ void lowerTo(ShapeGroup::Values& smallest, const auto& values) { smallest = smal
 
 CollapseProbe::Verdict CollapseProbe::judge(const ShapeGroup& shapes, const CollapseStar& star, double floor) {
   measureTriangles(shapes, star);
-  if (turn_.minCoeff() < kSmallestTurnCosine) return {};
   measureFolds(star);
   const auto before = regularity(quality_before_, fold_before_), after = regularity(quality_after_, fold_after_);
-  return {!(after < before.min(floor)).any(), before.minCoeff(), after.minCoeff()};
+  const auto unfolds = before < kPoorRegularity && after > kClearGain * before;
+  const bool acceptable = !(turn_ < kSmallestTurnCosine && !unfolds).any() && !(after < before.min(floor)).any();
+  return {acceptable, before.minCoeff(), after.minCoeff()};
 }
 
 /// Also leaves the triangle's squared quality in squared_quality_.

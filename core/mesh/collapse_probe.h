@@ -30,8 +30,9 @@ class CollapseProbe {
     double before = 0, after = 0;
   };
 
-  /// A collapse is acceptable when no triangle of any shape turns by more than 70 degrees, and the regularity of every
-  /// shape stays above `floor` or at least where it was. before and after are set when no triangle turns too far.
+  /// A collapse is acceptable when the regularity of every shape stays above `floor` or at least where it was, and
+  /// triangles turn by more than 70 degrees only in shapes where that unfolds them: from a regularity below 0.5 to one
+  /// at least a fifth better.
   Verdict judge(const ShapeGroup& shapes, const CollapseStar& star, double floor);
 
  private:
