@@ -12,12 +12,6 @@ namespace {
 
 bool seen(const AnchorTarget& target) { return target.weight > 0; }
 
-Vertices wantedPositions(const std::vector<AnchorTarget>& targets) {
-  Vertices wanted(static_cast<Eigen::Index>(targets.size()), 3);
-  for (std::size_t l = 0; l < targets.size(); ++l) wanted.row(static_cast<Eigen::Index>(l)) = targets[l].position;
-  return wanted;
-}
-
 Eigen::VectorXd weightsOf(const std::vector<AnchorTarget>& targets) {
   Eigen::VectorXd weights(static_cast<Eigen::Index>(targets.size()));
   for (std::size_t l = 0; l < targets.size(); ++l) weights[static_cast<Eigen::Index>(l)] = targets[l].weight;
@@ -36,56 +30,80 @@ std::optional<std::string> MarkerTrackerOptions::firstViolation() const {
   return std::nullopt;
 }
 
-MarkerTracker::MarkerTracker(std::shared_ptr<const Submanifold> submanifold, std::vector<Anchor> anchors,
+MarkerTracker::MarkerTracker(std::shared_ptr<const Submanifold> submanifold, std::vector<MarkerSite> sites,
                              MarkerTrackerOptions options)
-    : submanifold_(std::move(submanifold)), anchors_(std::move(anchors)), options_(std::move(options)),
+    : submanifold_(std::move(submanifold)), sites_(std::move(sites)), options_(std::move(options)),
       size_(boundingBoxDiagonal(submanifold_->pga().mean)), shape_(submanifold_->pga().mean), prior_(shape_) {
   if (const auto violation = options_.firstViolation()) throw InvalidInput("options", *violation);
-  if (anchors_.size() < 3)
-    throw InvalidInput("marker_set", "has " + std::to_string(anchors_.size()) + " markers, a fit needs at least three");
+  if (sites_.size() < 3)
+    throw InvalidInput("marker_set", "has " + std::to_string(sites_.size()) + " markers, a fit needs at least three");
   if (options_.scale) scale_ = *options_.scale;
 }
 
-std::vector<AnchorTarget> MarkerTracker::targetsOf(const MarkerPositions& markers) const {
-  if (markers.rows() != static_cast<Eigen::Index>(anchors_.size()))
+/// The site's offset turned as the patch around it was, from the template to `shape`.
+Eigen::Vector3d MarkerTracker::offsetOn(const Vertices& shape, const MarkerSite& site) const {
+  if (site.offset.isZero()) return Eigen::Vector3d::Zero();
+  Vertices patch(static_cast<Eigen::Index>(site.patch.size()), 3);
+  for (std::size_t i = 0; i < site.patch.size(); ++i) patch.row(static_cast<Eigen::Index>(i)) = shape.row(site.patch[i]);
+  return alignRigidly(site.patch_template, patch).rotation * site.offset;
+}
+
+/// Where the model has the markers on a shape, L x 3.
+Vertices MarkerTracker::modelPoints(const Vertices& shape) const {
+  Vertices points(static_cast<Eigen::Index>(sites_.size()), 3);
+  for (std::size_t l = 0; l < sites_.size(); ++l)
+    points.row(static_cast<Eigen::Index>(l)) =
+        position(sites_[l].skin, submanifold_->calculus().topology().faces(), shape) + offsetOn(shape, sites_[l]);
+  return points;
+}
+
+void MarkerTracker::takeMarkers(const MarkerPositions& markers) {
+  if (markers.rows() != static_cast<Eigen::Index>(sites_.size()))
     throw InvalidInput("markers", "has " + std::to_string(markers.rows()) + " rows, the marker set has " +
-                                      std::to_string(anchors_.size()) + " markers");
-  std::vector<AnchorTarget> targets;
-  for (std::size_t l = 0; l < anchors_.size(); ++l) {
-    const Eigen::Vector3d position = markers.row(static_cast<Eigen::Index>(l)).transpose() / scale_;
-    const bool here = position.allFinite();
-    targets.push_back({anchors_[l], here ? position : Eigen::Vector3d::Zero(), here ? 1.0 : 0.0});
+                                      std::to_string(sites_.size()) + " markers");
+  targets_.clear();
+  markers_ = Vertices::Zero(markers.rows(), 3);
+  for (std::size_t l = 0; l < sites_.size(); ++l) {
+    const auto row = static_cast<Eigen::Index>(l);
+    const bool here = markers.row(row).allFinite();
+    if (here) markers_.row(row) = markers.row(row) / scale_;
+    targets_.push_back({sites_[l].skin, markers_.row(row), here ? 1.0 : 0.0});
   }
-  return targets;
 }
 
-void MarkerTracker::followRigidly(const std::vector<AnchorTarget>& targets) {
-  const Vertices points = anchorPositions(submanifold_->calculus().topology(), targets, shape_);
-  shape_ = apply(alignRigidly(points, wantedPositions(targets), weightsOf(targets)), shape_);
-}
-
-/// The mean, moved and scaled by its marker points.
-void MarkerTracker::place(const std::vector<AnchorTarget>& targets) {
-  shape_ = prior_ = submanifold_->pga().mean;
-  followRigidly(targets);
-}
+/// Moves the shape by the rigid motion that brings its marker points to the markers.
+void MarkerTracker::followRigidly() { shape_ = apply(alignRigidly(modelPoints(shape_), markers_, weightsOf(targets_)), shape_); }
 
 /// Geman-McClure weights (c^2 / (c^2 + r^2))^2 of the current residuals.
-void MarkerTracker::updateWeights(std::vector<AnchorTarget>& targets) const {
+void MarkerTracker::updateWeights() {
   if (options_.robust_scale == 0) return;
   const double c = options_.robust_scale * size_;
-  for (auto& target : targets) {
-    if (!seen(target)) continue;
-    const double r2 = (position(target.anchor, submanifold_->calculus().topology().faces(), shape_) - target.position).squaredNorm();
-    const double ratio = c * c / (c * c + r2);
-    target.weight = ratio * ratio;
+  const Vertices points = modelPoints(shape_);
+  for (std::size_t l = 0; l < targets_.size(); ++l) {
+    if (!seen(targets_[l])) continue;
+    const auto row = static_cast<Eigen::Index>(l);
+    const double ratio = c * c / (c * c + (points.row(row) - markers_.row(row)).squaredNorm());
+    targets_[l].weight = ratio * ratio;
   }
 }
 
-Outcome MarkerTracker::fitShape(std::vector<AnchorTarget>& targets) {
-  auto fit = fitAnchored(submanifold_->calculus(), prior_, targets, shape_,
+/// The size of the subject: of the markers against their points on the projection, which the markers do not stretch.
+void MarkerTracker::updateScale() {
+  if (options_.scale) return;
+  const auto motion = alignSimilarly(modelPoints(prior_), markers_, weightsOf(targets_));
+  if (!(motion.scale > 0.1 && motion.scale < 10)) return;
+  scale_ *= motion.scale;
+  shape_ /= motion.scale;
+  markers_ /= motion.scale;
+}
+
+/// min over s for fixed P[s]; offsets keep the direction they have on the shape at hand.
+Outcome MarkerTracker::fitShape() {
+  for (std::size_t l = 0; l < targets_.size(); ++l)
+    targets_[l].position = markers_.row(static_cast<Eigen::Index>(l)).transpose() - offsetOn(shape_, sites_[l]);
+  auto fit = fitAnchored(submanifold_->calculus(), prior_, targets_, shape_,
                          {options_.prior_weight, 60, 1e-5, options_.submanifold.stop});
-  shape_ = std::move(fit.solution);
+  if (fit.termination != Termination::kNumericalFailure) shape_ = std::move(fit.solution);
   return fit;
 }
 
@@ -98,82 +116,70 @@ Outcome MarkerTracker::projectShape() {
   return projected;
 }
 
-/// The size of the subject: of the markers against their points on the projection, which the markers do not stretch.
-void MarkerTracker::updateScale(std::vector<AnchorTarget>& targets, const MarkerPositions& markers) {
-  if (options_.scale) return;
-  const Vertices points = anchorPositions(submanifold_->calculus().topology(), targets, prior_);
-  const auto motion = alignSimilarly(points, wantedPositions(targets), weightsOf(targets));
-  if (!(motion.scale > 0.1 && motion.scale < 10)) return;
-  scale_ *= motion.scale;
-  shape_ /= motion.scale;
-  const auto rescaled = targetsOf(markers);
-  for (std::size_t l = 0; l < targets.size(); ++l) targets[l].position = rescaled[l].position;
-}
-
-Outcome MarkerTracker::firstFrame(std::vector<AnchorTarget>& targets, const MarkerPositions& markers) {
-  if (!determinePlacement(targets))
+Outcome MarkerTracker::firstFrame() {
+  for (std::size_t l = 0; l < targets_.size(); ++l) targets_[l].position = markers_.row(static_cast<Eigen::Index>(l));
+  if (!determinePlacement(targets_))
     throw InvalidInput("markers", "the first frame shows fewer than three markers, or only markers on one line");
-  place(targets);
-  updateScale(targets, markers);
-  followRigidly(targets);
+  shape_ = prior_ = submanifold_->pga().mean;
+  updateScale();
+  followRigidly();
   Outcome outcome;
   double last_energy = std::numeric_limits<double>::infinity();
+  const auto& calculus = submanifold_->calculus();
   for (int round = 0; round < options_.first_alternations; ++round) {
-    outcome = fitShape(targets);
+    outcome = fitShape();
     if (outcome.termination == Termination::kCancelled) return outcome;
     outcome += projectShape();
     if (!outcome.converged()) return outcome;
-    updateScale(targets, markers);
-    updateWeights(targets);
-    const double energy = shellEnergy(submanifold_->calculus().topology(), shape_, prior_, submanifold_->calculus().bending());
+    updateScale();
+    updateWeights();
+    const double energy = shellEnergy(calculus.topology(), shape_, prior_, calculus.bending());
     if (round > 2 && energy > 0.98 * last_energy) break;
     last_energy = energy;
   }
-  outcome += fitShape(targets);
+  outcome += fitShape();
   started_ = true;
   return outcome;
 }
 
-Outcome MarkerTracker::nextFrame(std::vector<AnchorTarget>& targets) {
-  followRigidly(targets);
-  updateWeights(targets);
-  Outcome outcome = fitShape(targets);
+Outcome MarkerTracker::nextFrame() {
+  followRigidly();
+  // every marker counts before outliers are judged: a fast motion must not look like a frame of outliers
+  Outcome outcome = fitShape();
   for (int round = 0; round < options_.alternations && outcome.termination != Termination::kCancelled; ++round) {
     outcome += projectShape();
-    updateWeights(targets);
-    outcome += fitShape(targets);
+    updateWeights();
+    outcome += fitShape();
   }
   return outcome;
 }
 
 Solved<MarkerFit> MarkerTracker::fit(const MarkerPositions& markers) {
-  auto targets = targetsOf(markers);
+  takeMarkers(markers);
   Outcome outcome;
-  bool held = false;
+  const bool enough = determinePlacement(targets_);
   if (!started_)
-    outcome = firstFrame(targets, markers);
-  else if (determinePlacement(targets))
-    outcome = nextFrame(targets);
-  else
-    held = true;
-  auto result = report(targets);
-  result.held = held;
+    outcome = firstFrame();
+  else if (enough)
+    outcome = nextFrame();
+  auto result = report();
+  result.held = started_ && !enough;
   return {std::move(result), outcome};
 }
 
-MarkerFit MarkerTracker::report(const std::vector<AnchorTarget>& targets) const {
+MarkerFit MarkerTracker::report() const {
   const auto& calculus = submanifold_->calculus();
   MarkerFit result;
-  result.residuals.resize(static_cast<Eigen::Index>(targets.size()));
-  result.weights = weightsOf(targets);
-  const Vertices points = anchorPositions(calculus.topology(), targets, shape_);
+  result.weights = weightsOf(targets_);
+  result.residuals = scale_ * (modelPoints(shape_) - markers_).rowwise().norm();
   double sum = 0;
   int count = 0;
-  for (std::size_t l = 0; l < targets.size(); ++l) {
-    const auto row = static_cast<Eigen::Index>(l);
-    const double distance = scale_ * (points.row(row).transpose() - targets[l].position).norm();
-    result.residuals[row] = seen(targets[l]) ? distance : std::nan("");
-    if (seen(targets[l])) sum += distance * distance, ++count;
+  for (std::size_t l = 0; l < targets_.size(); ++l) {
+    auto& residual = result.residuals[static_cast<Eigen::Index>(l)];
+    if (seen(targets_[l]))
+      sum += residual * residual, ++count;
+    else
+      residual = std::nan("");
   }
   result.rms = count > 0 ? std::sqrt(sum / count) : std::nan("");
   result.scale = scale_;

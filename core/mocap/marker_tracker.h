@@ -11,13 +11,24 @@ namespace shaped {
 /// Positions of L markers in one frame, L x 3 [m]; a row of NaN is a marker that was not seen.
 using MarkerPositions = Vertices;
 
+/// Where one marker sits: over a point of the surface, by an offset that turns with the patch of surface around it.
+///
+/// The patch is wide enough to turn steadily; hung on a single triangle, a marker on a bar would wring that triangle.
+struct MarkerSite {
+  Anchor skin;                                        ///< the point on the surface
+  Eigen::Vector3d offset = Eigen::Vector3d::Zero();   ///< from there to the marker, in the axes of the template [m]
+  std::vector<std::int32_t> patch;                    ///< vertices around it; not needed where the offset is zero
+  Vertices patch_template;                            ///< their positions on the template
+};
+
 struct MarkerTrackerOptions {
-  double prior_weight = 0.1;    ///< gamma of (22), > 0
+  double prior_weight = 1;      ///< gamma of (22), > 0
   double robust_scale = 0.05;   ///< distance at which a marker's pull is quartered, over the model's size; 0 = least squares
   int alternations = 1;         ///< projections a frame after the first, >= 1
   int first_alternations = 10;  ///< at most, in the first frame, >= 1
   std::optional<double> scale;  ///< size of the subject over that of the model; estimated where not given
-  SubmanifoldOptions submanifold;
+  /// Looser than elsewhere: the markers' own error is far above what this costs.
+  SubmanifoldOptions submanifold{.tolerance = 1e-3, .shape_tolerance = 1e-5, .stop = {}};
 
   /// "prior_weight = 0, want > 0"; empty when all is well.
   std::optional<std::string> firstViolation() const;
@@ -42,31 +53,34 @@ struct MarkerFit {
 /// Keeps the state of one sequence; one object per sequence and thread.
 class MarkerTracker {
  public:
-  /// anchors: where the markers sit on the model's surface, at least three. Throws InvalidInput naming "marker_set" or
+  /// sites: where the markers sit on the model's coarse mesh, at least three. Throws InvalidInput naming "marker_set" or
   /// the option at fault.
-  MarkerTracker(std::shared_ptr<const Submanifold> submanifold, std::vector<Anchor> anchors, MarkerTrackerOptions options);
+  MarkerTracker(std::shared_ptr<const Submanifold> submanifold, std::vector<MarkerSite> sites, MarkerTrackerOptions options);
 
   /// Fits the next frame. Throws InvalidInput naming "markers" when the frame has not L rows, or when it is the first
   /// and fewer than three markers, or only markers on one line, were seen.
   Solved<MarkerFit> fit(const MarkerPositions& markers);
 
  private:
-  std::vector<AnchorTarget> targetsOf(const MarkerPositions& markers) const;
-  void place(const std::vector<AnchorTarget>& targets);
-  void followRigidly(const std::vector<AnchorTarget>& targets);
-  void updateWeights(std::vector<AnchorTarget>& targets) const;
-  Outcome fitShape(std::vector<AnchorTarget>& targets);
+  void takeMarkers(const MarkerPositions& markers);
+  Vertices modelPoints(const Vertices& shape) const;
+  Eigen::Vector3d offsetOn(const Vertices& shape, const MarkerSite& site) const;
+  void followRigidly();
+  void updateWeights();
+  void updateScale();
+  Outcome fitShape();
   Outcome projectShape();
-  void updateScale(std::vector<AnchorTarget>& targets, const MarkerPositions& markers);
-  Outcome firstFrame(std::vector<AnchorTarget>& targets, const MarkerPositions& markers);
-  Outcome nextFrame(std::vector<AnchorTarget>& targets);
-  MarkerFit report(const std::vector<AnchorTarget>& targets) const;
+  Outcome firstFrame();
+  Outcome nextFrame();
+  MarkerFit report() const;
 
   std::shared_ptr<const Submanifold> submanifold_;
-  std::vector<Anchor> anchors_;
+  std::vector<MarkerSite> sites_;
   MarkerTrackerOptions options_;
   double size_;       ///< of the mean [m]
   double scale_ = 1;
+  std::vector<AnchorTarget> targets_;  ///< of the current frame: scaled-down markers without their offsets
+  Vertices markers_;                   ///< of the current frame, scaled down; zero where not seen
   bool started_ = false;
   Vertices shape_;    ///< s, unscaled, placed as the scaled-down markers
   Vertices prior_;    ///< P[s]

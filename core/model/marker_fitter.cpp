@@ -5,7 +5,7 @@
 namespace shaped {
 
 MarkerFitter::MarkerFitter(ShellPgaModelPtr model, const MarkerSet& markers, const MarkerTrackerOptions& options)
-    : model_(std::move(model)), tracker_(model_->submanifoldPtr(), model_->anchorsOf(markers), options) {}
+    : model_(std::move(model)), tracker_(model_->submanifoldPtr(), model_->sitesOf(markers), options) {}
 
 Solved<FittedFrame> MarkerFitter::fit(const MarkerPositions& markers) {
   auto tracked = tracker_.fit(markers);

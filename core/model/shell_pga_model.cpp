@@ -1,6 +1,7 @@
 #include "core/model/shell_pga_model.h"
 
 #include <Eigen/Geometry>
+#include <set>
 
 #include "core/numerics/error.h"
 #include "core/surface/closest_point.h"
@@ -62,35 +63,43 @@ Anchor ShellPgaModel::anchorOfVertex(std::int32_t vertex, const std::string& fie
   return anchor;
 }
 
-std::vector<Anchor> ShellPgaModel::anchorsOf(const MarkerSet& markers) const {
-  std::vector<Anchor> anchors;
+/// The surface point of an anchor, with what lies between it and the marker as an offset over the faces around.
+MarkerSite ShellPgaModel::siteAt(const Anchor& anchor, const Eigen::Vector3d& marker) const {
+  const auto& faces = parts_.coarsening.coarse->faces();
+  MarkerSite site;
+  site.skin = {anchor.face, anchor.barycentric, Eigen::Vector3d::Zero()};
+  site.offset = marker - position(site.skin, faces, coarse_template_);
+  std::set<std::int32_t> patch{faces(anchor.face, 0), faces(anchor.face, 1), faces(anchor.face, 2)};
+  for (int ring = 0; ring < 2; ++ring) {
+    const auto inner = patch;
+    for (Eigen::Index f = 0; f < faces.rows(); ++f)
+      for (int c = 0; c < 3; ++c)
+        if (inner.contains(faces(f, c))) patch.insert({faces(f, 0), faces(f, 1), faces(f, 2)});
+  }
+  site.patch.assign(patch.begin(), patch.end());
+  site.patch_template = coarse_template_(site.patch, Eigen::all);
+  return site;
+}
+
+std::vector<MarkerSite> ShellPgaModel::sitesOf(const MarkerSet& markers) const {
+  std::vector<MarkerSite> sites;
   for (std::size_t l = 0; l < markers.markers.size(); ++l) {
     const auto& marker = markers.markers[l];
     const std::string field = "markers[" + std::to_string(l) + "] (" + marker.label + ")";
-    Eigen::Vector3d skin;
     if (marker.vertex >= 0) {
-      Anchor anchor = anchorOfVertex(marker.vertex, field);
-      if (marker.offset.isZero()) {
-        anchors.push_back(anchor);
-        continue;
-      }
-      skin = parts_.template_shape.row(marker.vertex);
-      const Eigen::Vector3d barycentric = anchor.barycentric;
-      anchors.push_back(makeAnchor(parts_.coarsening.coarse->faces(), coarse_template_, anchor.face, barycentric,
-                                   skin + marker.offset));
+      const Anchor anchor = anchorOfVertex(marker.vertex, field);
+      sites.push_back(siteAt(anchor, parts_.template_shape.row(marker.vertex).transpose() + marker.offset));
       continue;
     }
     if (marker.face < 0 || marker.face >= topology().faces().rows())
       throw InvalidInput(field, "face " + std::to_string(marker.face) + " is outside [0, " +
                                     std::to_string(topology().faces().rows()) + ")");
-    skin.setZero();
+    Eigen::Vector3d skin = Eigen::Vector3d::Zero();
     for (int c = 0; c < 3; ++c)
       skin += marker.barycentric[c] * parts_.template_shape.row(topology().faces()(marker.face, c)).transpose();
-    Anchor anchor = anchorOfPoint(skin);
-    anchors.push_back(makeAnchor(parts_.coarsening.coarse->faces(), coarse_template_, anchor.face,
-                                 Eigen::Vector3d(anchor.barycentric), skin + marker.offset));
+    sites.push_back(siteAt(anchorOfPoint(skin), skin + marker.offset));
   }
-  return anchors;
+  return sites;
 }
 
 const ShellStructurePtr& ShellPgaModel::fineStructure() const {

@@ -7,6 +7,7 @@
 #include "core/mesh/anchor.h"
 #include "core/mesh/prolongation.h"
 #include "core/mocap/marker_set.h"
+#include "core/mocap/marker_tracker.h"
 #include "core/statistics/submanifold.h"
 
 namespace shaped {
@@ -56,14 +57,15 @@ class ShellPgaModel {
 
   /// Where a full-resolution vertex sits on the coarse mesh. Throws InvalidInput naming `field` when out of range.
   Anchor anchorOfVertex(std::int32_t vertex, const std::string& field) const;
-  /// Anchors of all markers on the coarse mesh, offsets included. Throws InvalidInput naming markers[i].
-  std::vector<Anchor> anchorsOf(const MarkerSet& markers) const;
+  /// Where the markers sit on the coarse mesh. Throws InvalidInput naming markers[i].
+  std::vector<MarkerSite> sitesOf(const MarkerSet& markers) const;
 
   /// Sparsity and symbolic factorisation at full resolution, made at the first call.
   const ShellStructurePtr& fineStructure() const;
 
  private:
   Anchor anchorOfPoint(const Eigen::Vector3d& point) const;
+  MarkerSite siteAt(const Anchor& anchor, const Eigen::Vector3d& marker) const;
 
   ShellPgaParts parts_;
   std::shared_ptr<const Submanifold> submanifold_;
