@@ -80,7 +80,9 @@ void Topology::buildEdges() {
     if (end - begin == 2) interior.push_back({sides[begin], sides[begin + 1]});
   }
   hinges_.reserve(interior.size());
+  face_hinges_.assign(face_edges_.size(), {-1, -1, -1});
   for (const auto& [one, two] : interior) {
+    face_hinges_[one.face][one.corner] = face_hinges_[two.face][two.corner] = static_cast<std::int32_t>(hinges_.size());
     const auto& e1 = face_edges_[one.face];
     const auto& e2 = face_edges_[two.face];
     hinges_.push_back({{one.from, one.to, faces_(one.face, one.corner), faces_(two.face, two.corner)},

@@ -36,6 +36,8 @@ class Topology {
   const std::vector<std::array<std::int32_t, 3>>& faceEdges() const { return face_edges_; }
   /// One per interior edge.
   const std::vector<Hinge>& hinges() const { return hinges_; }
+  /// F x 3: entry i is the hinge at the edge opposite the face's corner i, -1 at the boundary.
+  const std::vector<std::array<std::int32_t, 3>>& faceHinges() const { return face_hinges_; }
   /// Component of each vertex, numbered from 0 in order of the smallest vertex.
   const std::vector<std::int32_t>& components() const { return components_; }
   std::int32_t componentCount() const { return component_count_; }
@@ -52,7 +54,7 @@ class Topology {
   std::int32_t vertex_count_;
   Faces faces_;
   std::vector<std::array<std::int32_t, 2>> edges_;
-  std::vector<std::array<std::int32_t, 3>> face_edges_;
+  std::vector<std::array<std::int32_t, 3>> face_edges_, face_hinges_;
   std::vector<Hinge> hinges_;
   std::vector<std::int32_t> components_;
   std::int32_t component_count_ = 0;

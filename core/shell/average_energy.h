@@ -18,8 +18,10 @@ class AverageEnergy {
   void add(const Topology& topology, const ShellMeasures& undeformed, double bending, double weight);
 
   double value(const Topology& topology, const ShellMeasures& deformed) const;
-  void addGradient(const Topology& topology, const ShellMeasures& deformed, double weight, MeasureGradient& gradient) const;
-  void addCurvature(const Topology& topology, const ShellMeasures& deformed, double weight, MeasureCurvature& curvature) const;
+  void addGradient(const Topology& topology, const ShellMeasures& deformed, double weight,
+                   MeasureGradient& gradient) const;
+  void addCurvature(const Topology& topology, const ShellMeasures& deformed, double weight,
+                    MeasureCurvature& curvature) const;
 
  private:
   struct Triangle {
@@ -27,11 +29,9 @@ class AverageEnergy {
     double m = 0, h = 0;
   };
   struct Fold {
-    double weight = 0;    ///< sum of w_j c_j
-    double moment = 0;    ///< sum of w_j c_j (theta_j - reference)
-    double reference = 0; ///< angle of the first shape
-
-    double target() const { return reference + (weight > 0 ? moment / weight : 0); }
+    double weight = 0;     ///< sum of w_j c_j
+    double target = 0;     ///< theta*, the mean of the lifted angles by these weights
+    double reference = 0;  ///< angle of the first shape
   };
 
   std::vector<Triangle> triangles_;

@@ -1,95 +1,119 @@
 #include "core/shell/measure_derivatives.h"
 
-#include <Eigen/Eigenvalues>
 #include <algorithm>
 
+#include "core/shell/face_element.h"
 #include "core/shell/hinge_geometry.h"
 
 namespace shaped {
 namespace {
 
-using Matrix9 = Eigen::Matrix<double, 9, 9>;
-
-constexpr std::array<std::array<int, 2>, 6> kFacePairs{{{0, 0}, {1, 1}, {2, 2}, {1, 0}, {2, 1}, {0, 2}}};
-constexpr std::array<std::array<std::size_t, 2>, 10> kHingePairs{
-    {{0, 0}, {1, 1}, {2, 2}, {3, 3}, {1, 0}, {2, 0}, {3, 0}, {2, 1}, {3, 1}, {3, 2}}};
-
-void addBlock(const LowerSlot& slot, const Eigen::Matrix3d& block, SymmetricBlockMatrix& matrix) {
-  Eigen::Map<Eigen::Matrix3d> target(matrix.block(slot.slot));
-  if (slot.transposed)
-    target += block.transpose();
-  else
-    target += block;
+void addEdgeForces(const Topology& topology, const Vertices& shape, const Eigen::VectorXd& slope, Vertices& gradient) {
+  const auto& edges = topology.edges();
+  for (std::size_t e = 0; e < edges.size(); ++e) {
+    const auto [a, b] = edges[e];
+    const Eigen::RowVector3d force = 2 * slope.data()[e] * (shape.row(b) - shape.row(a));
+    gradient.row(b) += force;
+    gradient.row(a) -= force;
+  }
 }
 
-/// Element matrix of a triangle. Edge k runs from corner k + 1 to corner k + 2, dl_k = 2 e_k . (dx_{k+2} - dx_{k+1}).
-Matrix9 faceElement(const FaceCurvature& curvature, const std::array<Eigen::Vector3d, 3>& edges) {
-  const auto& f = curvature.length;
-  const double length[3][3] = {{f[0], f[3], f[5]}, {f[3], f[1], f[4]}, {f[5], f[4], f[2]}};
-  // dl/dx, column k for edge k
-  Eigen::Matrix<double, 9, 3> chain = Eigen::Matrix<double, 9, 3>::Zero();
-  for (int k = 0; k < 3; ++k) {
-    chain.block<3, 1>(3 * ((k + 2) % 3), k) = 2 * edges[static_cast<std::size_t>(k)];
-    chain.block<3, 1>(3 * ((k + 1) % 3), k) = -2 * edges[static_cast<std::size_t>(k)];
+/// A value per hinge at the three edges of a face; 0 at the boundary.
+std::array<double, 3> atEdges(const Topology& topology, std::size_t f, const double* per_hinge) {
+  std::array<double, 3> result;
+  for (std::size_t k = 0; k < 3; ++k) {
+    const auto h = topology.faceHinges()[f][k];
+    result[k] = h >= 0 ? per_hinge[h] : 0;
   }
-  Matrix9 element = chain * Eigen::Map<const Eigen::Matrix3d>(&length[0][0]) * chain.transpose();
-  for (int k = 0; k < 3; ++k) {
-    const int a = 3 * ((k + 1) % 3), b = 3 * ((k + 2) % 3);
-    const double weight = 2 * curvature.weight[static_cast<std::size_t>(k)];
-    for (int axis = 0; axis < 3; ++axis) {
-      element(a + axis, a + axis) += weight;
-      element(b + axis, b + axis) += weight;
-      element(a + axis, b + axis) -= weight;
-      element(b + axis, a + axis) -= weight;
+  return result;
+}
+
+/// Forces on a face's corners from slopes in its area and in the fold angles at its edges.
+std::array<Eigen::RowVector3d, 3> faceForces(const FaceGeometry& face, double area, const std::array<double, 3>& w) {
+  const auto& [e, N, d, squared] = face;
+  const std::array<double, 3> u{w[0] / e[0].norm(), w[1] / e[1].norm(), w[2] / e[2].norm()};
+  const auto c = face.foldCoefficients(u);
+  const double inverse = 1 / squared, by_length = 0.5 * area * std::sqrt(inverse);
+  std::array<Eigen::RowVector3d, 3> forces;
+  for (std::size_t i = 0; i < 3; ++i) {
+    const std::size_t next = (i + 1) % 3, last = (i + 2) % 3;
+    forces[i] = (c[i] * inverse) * N + by_length * (d[next] * e[next] - d[last] * e[last]);
+  }
+  return forces;
+}
+
+/// block += addend, or its transpose where the slot is the transposed one's.
+void addBlock(const LowerSlot& slot, const Eigen::Matrix3d& addend, SymmetricBlockMatrix& matrix) {
+  const int rows = slot.transposed ? 3 : 1, columns = slot.transposed ? 1 : 3;
+  double* block = matrix.block(slot.slot);
+  for (int c = 0; c < 3; ++c)
+    for (int r = 0; r < 3; ++r) block[rows * r + columns * c] += addend(r, c);
+}
+
+/// Adds what the area's slope of the bending energy contributes to the second derivatives in the lengths.
+void addAreaSlope(const FaceGeometry& face, double slope, FaceCurvature& curvature) {
+  const double inverse = 1 / face.squared_norm, by_length = 0.25 * slope * std::sqrt(inverse);
+  const auto& d = face.d;
+  for (std::size_t p = 0; p < 6; ++p)
+    curvature.length[p] +=
+        0.5 * by_length * ((p < 3 ? -1 : 1) - d[kSymmetricPairs[p][0]] * d[kSymmetricPairs[p][1]] * inverse);
+  for (std::size_t i = 0; i < 3; ++i) curvature.weight[i] += by_length * d[i];
+}
+
+FaceElement faceElement(const Topology& topology, const Vertices& shape, const MeasureCurvature& curvature,
+                        std::size_t f) {
+  const FaceGeometry face(topology.faces(), static_cast<Eigen::Index>(f), shape);
+  if (curvature.kind == HessianKind::kProjected) {
+    auto element = lengthElement(face, curvature.faces[f]);
+    projectToPositive(face, element);
+    return element;
+  }
+  std::array<double, 3> angle{};
+  double area = 0;
+  for (std::size_t k = 0; k < 3; ++k)
+    if (const auto h = topology.faceHinges()[f][k]; h >= 0) {
+      angle[k] = curvature.hinges[static_cast<std::size_t>(h)].angle;
+      area += curvature.hinges[static_cast<std::size_t>(h)].area;
     }
-  }
+  auto lengths = curvature.faces[f];
+  if (curvature.first_argument) addAreaSlope(face, area, lengths);
+  auto element = lengthElement(face, lengths);
+  addFoldElement(face, angle, element);
   return element;
 }
 
-void projectToPositive(Matrix9& element) {
-  const Eigen::SelfAdjointEigenSolver<Matrix9> eigen(element);
-  element = eigen.eigenvectors() * eigen.eigenvalues().cwiseMax(0).asDiagonal() * eigen.eigenvectors().transpose();
-}
-
-void addFace(const ShellStructure& structure, const Vertices& shape, const FaceCurvature& curvature, HessianKind kind,
-             std::size_t f, SymmetricBlockMatrix& hessian) {
-  const auto v = structure.topology().faces().row(static_cast<Eigen::Index>(f));
-  std::array<Eigen::Vector3d, 3> edges;
-  for (int k = 0; k < 3; ++k) edges[static_cast<std::size_t>(k)] = shape.row(v[(k + 2) % 3]) - shape.row(v[(k + 1) % 3]);
-  Matrix9 element = faceElement(curvature, edges);
-  if (kind == HessianKind::kProjected) projectToPositive(element);
-  for (std::size_t p = 0; p < 6; ++p)
-    addBlock(structure.faceSlots()[f][p], element.block<3, 3>(3 * kFacePairs[p][0], 3 * kFacePairs[p][1]), hessian);
+void addFace(const std::array<LowerSlot, 6>& slots, const FaceElement& element, SymmetricBlockMatrix& hessian) {
+  for (std::size_t i = 0; i < 3; ++i) addBlock(slots[i], element.diagonal(i), hessian);
+  for (std::size_t k = 0; k < 3; ++k) addBlock(slots[3 + k], element.between[k], hessian);
 }
 
 /// Second derivative in a shape that is only ever deformed: the angle alone enters.
-void addDeformedHinge(const std::array<LowerSlot, 10>& slots, const HingeGeometry& geometry,
-                      const HingeCurvature& curvature, SymmetricBlockMatrix& hessian) {
-  std::array<Eigen::Vector3d, 4> angle;
-  for (std::size_t i = 0; i < 4; ++i) angle[i] = geometry.angleGradient(i);
-  for (std::size_t p = 0; p < 10; ++p) {
-    const auto [i, j] = kHingePairs[p];
-    Eigen::Matrix3d block = (curvature.angle_angle * angle[i]) * angle[j].transpose();
-    if (curvature.angle != 0 && p != 9) block += curvature.angle * geometry.angleHessian(i, j);
-    addBlock(slots[p], block, hessian);
+void addDeformedHinge(const std::array<LowerSlot, 10>& slots, const HingeGeometry& geometry, double angle_angle,
+                      SymmetricBlockMatrix& hessian) {
+  const auto angle = geometry.angleGradient();
+  for (const auto& slot : slots) {
+    const Eigen::Vector3d column = angle_angle * angle[slot.column];
+    Eigen::Map<Eigen::Matrix3d>(hessian.block(slot.slot)) += angle[slot.row] * column.transpose();
   }
 }
 
-void addUndeformedHinge(const std::array<LowerSlot, 10>& slots, const HingeGeometry& geometry,
-                        const HingeCurvature& c, SymmetricBlockMatrix& hessian) {
-  Eigen::Matrix3d form;
-  form << c.angle_angle, c.angle_length, c.angle_area, c.angle_length, c.length_length, c.length_area, c.angle_area,
-      c.length_area, c.area_area;
-  std::array<Eigen::Matrix3d, 4> gradients;
-  for (std::size_t i = 0; i < 4; ++i)
-    gradients[i] << geometry.angleGradient(i), geometry.lengthGradient(i), geometry.areaGradient(i);
-  for (std::size_t p = 0; p < 10; ++p) {
-    const auto [i, j] = kHingePairs[p];
-    Eigen::Matrix3d block = gradients[i] * form * gradients[j].transpose();
-    if (c.angle != 0 && p != 9) block += c.angle * geometry.angleHessian(i, j);
-    if (i < 2 && j < 2) block.diagonal().array() += (i == j ? 2 : -2) * c.length;
-    addBlock(slots[p], block, hessian);
+/// The quadratic form in angle, length and area, and the edge length's own curvature.
+void addUndeformedHinge(const std::array<LowerSlot, 10>& slots, const HingeGeometry& geometry, const HingeCurvature& c,
+                        SymmetricBlockMatrix& hessian) {
+  const auto angle = geometry.angleGradient(), length = geometry.lengthGradient(), area = geometry.areaGradient();
+  HingeGeometry::Gradient by_angle, by_length, by_area;
+  for (std::size_t j = 0; j < 4; ++j) {
+    by_angle[j] = c.angle_angle * angle[j] + c.angle_length * length[j] + c.angle_area * area[j];
+    by_length[j] = c.angle_length * angle[j] + c.length_length * length[j] + c.length_area * area[j];
+    by_area[j] = c.angle_area * angle[j] + c.length_area * length[j] + c.area_area * area[j];
   }
+  for (const auto& slot : slots)
+    Eigen::Map<Eigen::Matrix3d>(hessian.block(slot.slot)) += angle[slot.row] * by_angle[slot.column].transpose() +
+                                                             length[slot.row] * by_length[slot.column].transpose() +
+                                                             area[slot.row] * by_area[slot.column].transpose();
+  constexpr std::array<std::size_t, 3> edge_blocks{0, 1, 4};  // (0,0) (1,1) (1,0)
+  for (const auto p : edge_blocks)
+    Eigen::Map<Eigen::Matrix3d>(hessian.block(slots[p].slot)).diagonal().array() += (p < 2 ? 2 : -2) * c.length;
 }
 
 }  // namespace
@@ -103,33 +127,26 @@ void MeasureCurvature::reset(HessianKind hessian_kind) {
 
 void pullBackGradient(const Topology& topology, const Vertices& shape, const MeasureGradient& measures,
                       Vertices& gradient) {
-  const auto& edges = topology.edges();
-  for (std::size_t e = 0; e < edges.size(); ++e) {
-    const auto [a, b] = edges[e];
-    const Eigen::RowVector3d force = 2 * measures.edge[static_cast<Eigen::Index>(e)] * (shape.row(b) - shape.row(a));
-    gradient.row(b) += force;
-    gradient.row(a) -= force;
-  }
-  const auto& hinges = topology.hinges();
-  for (std::size_t h = 0; h < hinges.size(); ++h) {
-    const double weight = measures.hinge[static_cast<Eigen::Index>(h)];
-    const HingeGeometry geometry(hinges[h], shape);
-    for (std::size_t i = 0; i < 4; ++i)
-      gradient.row(hinges[h].vertices[i]) += weight * geometry.angleGradient(i).transpose();
+  addEdgeForces(topology, shape, measures.edge, gradient);
+  for (Eigen::Index f = 0; f < topology.faces().rows(); ++f) {
+    const auto folds = atEdges(topology, static_cast<std::size_t>(f), measures.hinge.data());
+    const auto forces = faceForces(FaceGeometry(topology.faces(), f, shape), measures.area[f], folds);
+    for (int i = 0; i < 3; ++i) gradient.row(topology.faces()(f, i)) += forces[static_cast<std::size_t>(i)];
   }
 }
 
 void pullBackHessian(const ShellStructure& structure, const Vertices& shape, const MeasureCurvature& curvature,
                      SymmetricBlockMatrix& hessian) {
+  const auto& topology = structure.topology();
   for (std::size_t f = 0; f < curvature.faces.size(); ++f)
-    addFace(structure, shape, curvature.faces[f], curvature.kind, f, hessian);
-  const auto& hinges = structure.topology().hinges();
+    addFace(structure.faceSlots()[f], faceElement(topology, shape, curvature, f), hessian);
+  const auto& hinges = topology.hinges();
   for (std::size_t h = 0; h < hinges.size(); ++h) {
     const HingeGeometry geometry(hinges[h], shape);
     if (curvature.first_argument)
       addUndeformedHinge(structure.hingeSlots()[h], geometry, curvature.hinges[h], hessian);
     else
-      addDeformedHinge(structure.hingeSlots()[h], geometry, curvature.hinges[h], hessian);
+      addDeformedHinge(structure.hingeSlots()[h], geometry, curvature.hinges[h].angle_angle, hessian);
   }
 }
 

@@ -4,6 +4,7 @@
 #include <vector>
 
 #include "core/shell/measures.h"
+#include "core/shell/membrane_density.h"
 #include "core/shell/structure.h"
 
 namespace shaped {
@@ -11,17 +12,19 @@ namespace shaped {
 /// First derivatives of an energy with respect to the measures of one shape.
 struct MeasureGradient {
   Eigen::VectorXd edge;   ///< dW/dl, per edge [1]
+  Eigen::VectorXd area;   ///< dW/da as far as the area is not expressed by the lengths, per face [1]
   Eigen::VectorXd hinge;  ///< dW/dtheta, per hinge [m^2]
 
   explicit MeasureGradient(const Topology& topology)
       : edge(Eigen::VectorXd::Zero(static_cast<Eigen::Index>(topology.edges().size()))),
+        area(Eigen::VectorXd::Zero(topology.faces().rows())),
         hinge(Eigen::VectorXd::Zero(static_cast<Eigen::Index>(topology.hinges().size()))) {}
-  void setZero() { edge.setZero(), hinge.setZero(); }
+  void setZero() { edge.setZero(), area.setZero(), hinge.setZero(); }
 };
 
 /// Second derivatives of one triangle's energy in its squared edge lengths, ordered as the triangle's corners.
 struct FaceCurvature {
-  std::array<double, 6> length{};  ///< d2W/dl dl: (0,0) (1,1) (2,2) (1,0) (2,1) (0,2)
+  Symmetric3 length{};             ///< d2W/dl dl
   std::array<double, 3> weight{};  ///< dW/dl
 };
 
@@ -33,6 +36,7 @@ struct HingeCurvature {
   double length_length = 0, length_area = 0, area_area = 0;
   double angle = 0;   ///< dW/dtheta
   double length = 0;  ///< dW/dl
+  double area = 0;    ///< dW/dS
 };
 
 /// Which Hessian to form.

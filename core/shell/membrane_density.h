@@ -1,73 +1,89 @@
 #pragma once
 
 #include <array>
-#include <cmath>
 
 namespace shaped {
 
+/// Entries of a symmetric 3 x 3 matrix: (0,0) (1,1) (2,2) (1,0) (2,1) (0,2).
+using Symmetric3 = std::array<double, 6>;
+inline constexpr std::array<std::array<std::size_t, 2>, 6> kSymmetricPairs{
+    {{0, 0}, {1, 1}, {2, 2}, {1, 0}, {2, 1}, {0, 2}}};
+
+/// x_{i+1} + x_{i+2} - x_i for a triangle's squared lengths: 8 d(area^2)/dx_i.
+inline std::array<double, 3> spreads(const std::array<double, 3>& x) {
+  return {x[1] + x[2] - x[0], x[2] + x[0] - x[1], x[0] + x[1] - x[2]};
+}
+
 /// Membrane energy of one triangle, a W(G) with mu = lambda = 1, as a function of six squared lengths ([HZRS18] section
 /// 3, density of HRWW12 (8)):
-///   f = N / (16 a) + A^2 / (4 a) - (3/4) a log(A^2 / a^2) - (5/4) a,
-///   N = sum_i (l_{i+1} + l_{i+2} - l_i) L_i, a and A the areas.
-/// Undeformed quantities are l and a, deformed ones L and A; index i is the edge opposite corner i.
-struct MembraneDensity {
-  std::array<double, 3> l, L;
-  double a, A;
+///   f = N / (16 a) + A^2 / (4 a) - (3/2) a log(A / a) - (5/4) a,
+///   N = sum_i (l_{i+1} + l_{i+2} - l_i) L_i = sum_i (L_{i+1} + L_{i+2} - L_i) l_i.
+/// Undeformed quantities are l and a, deformed ones L and A; index i is the edge opposite corner i. Where log(A / a)
+/// enters, the caller passes it, because logarithms are cheapest computed many at a time.
+class MembraneDensity {
+ public:
+  MembraneDensity(const std::array<double, 3>& l, const std::array<double, 3>& L, double a, double A)
+      : s_(spreads(l)), S_(spreads(L)), n_(s_[0] * L[0] + s_[1] * L[1] + s_[2] * L[2]), a_(a), A_(A) {}
 
-  double value() const {
-    double n = 0;
-    for (std::size_t i = 0; i < 3; ++i) n += spread(l, i) * L[i];
-    return n / (16 * a) + A * A / (4 * a) - 1.5 * a * std::log(A / a) - 1.25 * a;
+  double value(double log_ratio) const { return (0.0625 * n_ + 0.25 * A_ * A_) / a_ - a_ * (1.5 * log_ratio + 1.25); }
+
+  /// df/dL
+  std::array<double, 3> deformedGradient() const {
+    const double rest = 0.0625 / a_, slope = 0.125 * areaSlope();
+    return {rest * s_[0] + slope * S_[0], rest * s_[1] + slope * S_[1], rest * s_[2] + slope * S_[2]};
   }
 
-  /// df/dL_i
-  double deformedDerivative(std::size_t i) const { return spread(l, i) / (16 * a) + areaSlope() * spread(L, i) / 8; }
-
-  /// df/dl_i
-  double undeformedDerivative(std::size_t i) const { return spread(L, i) / (16 * a) + restAreaSlope() * areaDerivative(i); }
-
-  /// d2f/dL_i dL_j
-  double deformedSecond(std::size_t i, std::size_t j) const {
-    const double squared = A * A;
-    return areaSlope() * sign(i, j) / 8 + 0.75 * a / (squared * squared) * spread(L, i) * spread(L, j) / 64;
+  /// df/dl
+  std::array<double, 3> undeformedGradient(double log_ratio) const {
+    const double rest = 0.0625 / a_, slope = rest * restAreaSlope(log_ratio);
+    return {rest * S_[0] + slope * s_[0], rest * S_[1] + slope * s_[1], rest * S_[2] + slope * s_[2]};
   }
 
-  /// d2f/dl_i dl_j
-  double undeformedSecond(std::size_t i, std::size_t j) const {
-    const double a2 = a * a;
-    double n = 0;
-    for (std::size_t k = 0; k < 3; ++k) n += spread(l, k) * L[k];
-    const double curvature = n / (8 * a2 * a) + A * A / (2 * a2 * a) + 1.5 / a;
-    return -(spread(L, i) * areaDerivative(j) + spread(L, j) * areaDerivative(i)) / (16 * a2) +
-           curvature * areaDerivative(i) * areaDerivative(j) + restAreaSlope() * areaSecond(i, j);
+  /// d2f/dL dL
+  Symmetric3 deformedHessian() const {
+    const double slope = 0.125 * areaSlope(), squared = A_ * A_, bow = 0.75 / 64 * a_ / (squared * squared);
+    Symmetric3 result;
+    for (std::size_t p = 0; p < 6; ++p)
+      result[p] = (p < 3 ? -slope : slope) + bow * S_[kSymmetricPairs[p][0]] * S_[kSymmetricPairs[p][1]];
+    return result;
   }
 
-  /// d2f/dl_i dL_j
-  double mixed(std::size_t i, std::size_t j) const {
-    const double a2 = a * a;
-    return sign(i, j) / (16 * a) + (-spread(l, j) / (16 * a2) - spread(L, j) / 8 * (0.25 / a2 + 0.75 / (A * A))) * areaDerivative(i);
+  /// d2f/dl dl
+  Symmetric3 undeformedHessian(double log_ratio) const {
+    const double inverse = 1 / a_, rest = 0.0625 * inverse;  // da/dl_i = rest s_i
+    const double curvature = (0.125 * n_ + 0.5 * A_ * A_) * inverse * inverse * inverse + 1.5 * inverse;
+    const double slope = restAreaSlope(log_ratio);
+    const double both = (curvature - slope * inverse) * rest * rest, mixed = rest * rest * inverse;
+    Symmetric3 result;
+    for (std::size_t p = 0; p < 6; ++p) {
+      const auto [i, j] = kSymmetricPairs[p];
+      result[p] = (p < 3 ? -slope : slope) * rest + both * s_[i] * s_[j] - mixed * (S_[i] * s_[j] + S_[j] * s_[i]);
+    }
+    return result;
   }
 
-  /// da/dl_i
-  double areaDerivative(std::size_t i) const { return spread(l, i) / (16 * a); }
-  /// d2a/dl_i dl_j
-  double areaSecond(std::size_t i, std::size_t j) const {
-    return sign(i, j) / (16 * a) - spread(l, i) * spread(l, j) / (256 * a * a * a);
+  /// d2f/dl_i dL_j, row i
+  std::array<std::array<double, 3>, 3> mixedHessian() const {
+    const double inverse = 1 / a_, rest = 0.0625 * inverse;
+    const double by_area = -0.125 * (0.25 * inverse * inverse + 0.75 / (A_ * A_));
+    std::array<std::array<double, 3>, 3> result;
+    for (std::size_t j = 0; j < 3; ++j) {
+      const double slope = rest * (by_area * S_[j] - rest * inverse * s_[j]);
+      for (std::size_t i = 0; i < 3; ++i) result[i][j] = (i == j ? -rest : rest) + slope * s_[i];
+    }
+    return result;
   }
-
-  /// x_{i+1} + x_{i+2} - x_i = 8 d(area^2)/dx_i
-  static double spread(const std::array<double, 3>& x, std::size_t i) { return x[(i + 1) % 3] + x[(i + 2) % 3] - x[i]; }
 
  private:
-  static double sign(std::size_t i, std::size_t j) { return i == j ? -1 : 1; }
   /// df/d(A^2)
-  double areaSlope() const { return 1 / (4 * a) - 0.75 * a / (A * A); }
+  double areaSlope() const { return 0.25 / a_ - 0.75 * a_ / (A_ * A_); }
   /// df/da at fixed l, L
-  double restAreaSlope() const {
-    double n = 0;
-    for (std::size_t k = 0; k < 3; ++k) n += spread(l, k) * L[k];
-    return -n / (16 * a * a) - A * A / (4 * a * a) - 1.5 * std::log(A / a) + 0.25;
+  double restAreaSlope(double log_ratio) const {
+    return -(0.0625 * n_ + 0.25 * A_ * A_) / (a_ * a_) - 1.5 * log_ratio + 0.25;
   }
+
+  std::array<double, 3> s_, S_;  ///< spreads of l and L
+  double n_, a_, A_;
 };
 
 }  // namespace shaped

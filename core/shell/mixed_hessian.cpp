@@ -1,6 +1,7 @@
 #include <Eigen/Core>
 
 #include "core/shell/energy.h"
+#include "core/shell/face_geometry.h"
 #include "core/shell/hinge_geometry.h"
 #include "core/shell/membrane_density.h"
 
@@ -9,28 +10,52 @@ namespace {
 
 using Block = Eigen::Map<Eigen::Matrix3d>;
 
-std::array<Eigen::Vector3d, 3> faceEdgeVectors(const Topology& topology, std::size_t f, const Vertices& shape) {
-  const auto v = topology.faces().row(static_cast<Eigen::Index>(f));
-  return {shape.row(v[2]) - shape.row(v[1]), shape.row(v[0]) - shape.row(v[2]), shape.row(v[1]) - shape.row(v[0])};
+/// One pair of shapes and the weights of its energy.
+struct Pair {
+  const Topology& topology;
+  const Vertices &undeformed, &deformed;
+  const ShellMeasures &rest, &current;
+  double bending, weight;
+};
+
+/// Chain rule through the lengths: with dl_k = 2 e_k . (dx_{k+2} - dx_{k+1}) on both sides, the block of corners
+/// (row, column) is e_{row+1} y_{row+1}^T - e_{row+2} y_{row+2}^T, y_k the derivative of df/dl_k in the column corner.
+void addFace(const Pair& pair, std::size_t f, const std::array<std::int32_t, 9>& slots, GeneralBlockMatrix& matrix) {
+  const auto& id = pair.topology.faceEdges()[f];
+  const double *l = pair.rest.squared_length.data(), *L = pair.current.squared_length.data();
+  const MembraneDensity triangle({l[id[0]], l[id[1]], l[id[2]]}, {L[id[0]], L[id[1]], L[id[2]]},
+                                 pair.rest.area.data()[f], pair.current.area.data()[f]);
+  const auto form = triangle.mixedHessian();
+  const auto& faces = pair.topology.faces();
+  const auto e = faceEdges(faces, static_cast<Eigen::Index>(f), pair.undeformed);
+  auto E = faceEdges(faces, static_cast<Eigen::Index>(f), pair.deformed);
+  for (auto& edge : E) edge *= 4 * pair.weight;
+  for (std::size_t column = 0; column < 3; ++column) {
+    const std::size_t next = (column + 1) % 3, last = (column + 2) % 3;
+    std::array<Eigen::Vector3d, 3> y;
+    for (std::size_t k = 0; k < 3; ++k) y[k] = form[k][next] * E[next] - form[k][last] * E[last];
+    for (std::size_t row = 0; row < 3; ++row) {
+      const std::size_t a = (row + 1) % 3, b = (row + 2) % 3;
+      Block(matrix.block(slots[3 * row + column])) += e[a] * y[a].transpose() - e[b] * y[b].transpose();
+    }
+  }
 }
 
-/// dl_k/dx_corner = +-2 e_k: edge k runs from corner k + 1 to corner k + 2.
-double edgeSign(std::size_t k, std::size_t corner) { return corner == (k + 2) % 3 ? 2 : (corner == (k + 1) % 3 ? -2 : 0); }
-
-void addFace(const std::array<std::int32_t, 9>& slots, const MembraneDensity& triangle,
-             const std::array<Eigen::Vector3d, 3>& e, const std::array<Eigen::Vector3d, 3>& E, double weight,
-             GeneralBlockMatrix& matrix) {
-  std::array<Eigen::Vector3d, 3> combined;  // sum over deformed edges of mixed(k, m) dL_m for each corner is built below
-  for (std::size_t column = 0; column < 3; ++column) {
-    for (std::size_t k = 0; k < 3; ++k) {
-      combined[k].setZero();
-      for (std::size_t m = 0; m < 3; ++m) combined[k] += (weight * triangle.mixed(k, m) * edgeSign(m, column)) * E[m];
-    }
-    for (std::size_t row = 0; row < 3; ++row) {
-      Block block(matrix.block(slots[3 * row + column]));
-      for (std::size_t k = 0; k < 3; ++k)
-        if (k != row) block += (edgeSign(k, row) * e[k]) * combined[k].transpose();
-    }
+/// Minus the derivative of 2 eta l / S d in the undeformed vertex times that of the deformed angle.
+void addHinge(const Pair& pair, std::size_t h, const std::array<std::int32_t, 16>& slots, GeneralBlockMatrix& matrix) {
+  const auto& hinge = pair.topology.hinges()[h];
+  const HingeGeometry geometry(hinge, pair.undeformed);
+  const auto deformed = HingeGeometry(hinge, pair.deformed).angleGradient();
+  const auto angle = geometry.angleGradient(), length = geometry.lengthGradient(), area = geometry.areaGradient();
+  const double* areas = pair.rest.area.data();
+  const double inverse_area = 1 / (areas[hinge.faces[0]] + areas[hinge.faces[1]]);
+  const double l = pair.rest.squared_length.data()[hinge.edges[0]];
+  const double d = angleDifference(pair.rest.angle.data()[h], pair.current.angle.data()[h]);
+  const double scale = -2 * pair.weight * pair.bending * inverse_area;
+  const double by_angle = scale * l, by_length = scale * d, by_area = -by_angle * d * inverse_area;
+  for (std::size_t r = 0; r < 4; ++r) {
+    const Eigen::Vector3d row = by_angle * angle[r] + by_length * length[r] + by_area * area[r];
+    for (std::size_t c = 0; c < 4; ++c) Block(matrix.block(slots[4 * r + c])) += row * deformed[c].transpose();
   }
 }
 
@@ -41,35 +66,11 @@ void addMixedHessian(const ShellStructure& structure, const Vertices& undeformed
                      const ShellMeasures& deformed_measures, double bending, double weight,
                      GeneralBlockMatrix& matrix) {
   const auto& topology = structure.topology();
-  const auto& l = undeformed_measures.squared_length;
-  const auto& L = deformed_measures.squared_length;
-  for (std::size_t f = 0; f < topology.faceEdges().size(); ++f) {
-    const auto& id = topology.faceEdges()[f];
-    const auto row = static_cast<Eigen::Index>(f);
-    const MembraneDensity triangle{{l[id[0]], l[id[1]], l[id[2]]},
-                                   {L[id[0]], L[id[1]], L[id[2]]},
-                                   undeformed_measures.area[row],
-                                   deformed_measures.area[row]};
-    addFace(structure.faceGeneralSlots()[f], triangle, faceEdgeVectors(topology, f, undeformed),
-            faceEdgeVectors(topology, f, deformed), weight, matrix);
-  }
-  const auto& hinges = topology.hinges();
-  for (std::size_t h = 0; h < hinges.size(); ++h) {
-    const auto& hinge = hinges[h];
-    const HingeGeometry one(hinge, undeformed), two(hinge, deformed);
-    const double S = undeformed_measures.area[hinge.faces[0]] + undeformed_measures.area[hinge.faces[1]];
-    const double squared = l[hinge.edges[0]];
-    const double d = angleDifference(undeformed_measures.angle[static_cast<Eigen::Index>(h)],
-                                     deformed_measures.angle[static_cast<Eigen::Index>(h)]);
-    const double scale = -2 * weight * bending / S;
-    for (std::size_t r = 0; r < 4; ++r) {
-      // derivative of factor * d in the undeformed vertex r
-      const Eigen::Vector3d row = scale * (squared * one.angleGradient(r) + d * one.lengthGradient(r) -
-                                           (d * squared / S) * one.areaGradient(r));
-      for (std::size_t c = 0; c < 4; ++c)
-        Block(matrix.block(structure.hingeGeneralSlots()[h][4 * r + c])) += row * two.angleGradient(c).transpose();
-    }
-  }
+  const Pair pair{topology, undeformed, deformed, undeformed_measures, deformed_measures, bending, weight};
+  for (std::size_t f = 0; f < topology.faceEdges().size(); ++f)
+    addFace(pair, f, structure.faceGeneralSlots()[f], matrix);
+  for (std::size_t h = 0; h < topology.hinges().size(); ++h)
+    addHinge(pair, h, structure.hingeGeneralSlots()[h], matrix);
 }
 
 }  // namespace shaped

@@ -5,8 +5,10 @@
 namespace shaped {
 namespace {
 
-constexpr std::array<std::array<int, 2>, 6> kFacePairs{{{0, 0}, {1, 1}, {2, 2}, {1, 0}, {2, 1}, {0, 2}}};
-constexpr std::array<std::array<int, 2>, 10> kHingePairs{
+using StencilPair = std::array<std::uint8_t, 2>;
+
+constexpr std::array<StencilPair, 6> kFacePairs{{{0, 0}, {1, 1}, {2, 2}, {2, 1}, {0, 2}, {1, 0}}};
+constexpr std::array<StencilPair, 10> kHingePairs{
     {{0, 0}, {1, 1}, {2, 2}, {3, 3}, {1, 0}, {2, 0}, {3, 0}, {2, 1}, {3, 1}, {3, 2}}};
 
 BlockPatternPtr makePattern(const Topology& topology) {
@@ -17,8 +19,11 @@ BlockPatternPtr makePattern(const Topology& topology) {
   return std::make_shared<BlockPattern>(topology.vertexCount(), stencils);
 }
 
-LowerSlot lowerSlot(const BlockPattern& pattern, std::int32_t row, std::int32_t column) {
-  return row >= column ? LowerSlot{pattern.lowerSlot(row, column), false} : LowerSlot{pattern.lowerSlot(column, row), true};
+template <class Stencil>
+LowerSlot lowerSlot(const BlockPattern& pattern, const Stencil& vertices, StencilPair pair) {
+  const auto [i, j] = pair;
+  if (vertices[i] >= vertices[j]) return {pattern.lowerSlot(vertices[i], vertices[j]), i, j, false};
+  return {pattern.lowerSlot(vertices[j], vertices[i]), j, i, true};
 }
 
 }  // namespace
@@ -30,7 +35,7 @@ ShellStructure::ShellStructure(TopologyPtr topology)
   face_general_slots_.resize(face_slots_.size());
   for (std::size_t f = 0; f < face_slots_.size(); ++f) {
     const auto v = topology_->faces().row(static_cast<Eigen::Index>(f));
-    for (std::size_t k = 0; k < 6; ++k) face_slots_[f][k] = lowerSlot(blocks, v[kFacePairs[k][0]], v[kFacePairs[k][1]]);
+    for (std::size_t k = 0; k < 6; ++k) face_slots_[f][k] = lowerSlot(blocks, v, kFacePairs[k]);
     for (int r = 0; r < 3; ++r)
       for (int c = 0; c < 3; ++c) face_general_slots_[f][static_cast<std::size_t>(3 * r + c)] = blocks.slot(v[r], v[c]);
   }
@@ -39,8 +44,7 @@ ShellStructure::ShellStructure(TopologyPtr topology)
   hinge_general_slots_.resize(hinges.size());
   for (std::size_t h = 0; h < hinges.size(); ++h) {
     const auto& v = hinges[h].vertices;
-    for (std::size_t k = 0; k < 10; ++k)
-      hinge_slots_[h][k] = lowerSlot(blocks, v[kHingePairs[k][0]], v[kHingePairs[k][1]]);
+    for (std::size_t k = 0; k < 10; ++k) hinge_slots_[h][k] = lowerSlot(blocks, v, kHingePairs[k]);
     for (std::size_t r = 0; r < 4; ++r)
       for (std::size_t c = 0; c < 4; ++c) hinge_general_slots_[h][4 * r + c] = blocks.slot(v[r], v[c]);
   }

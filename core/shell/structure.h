@@ -8,10 +8,11 @@
 
 namespace shaped {
 
-/// Where the 3 x 3 block of two stencil vertices lives in a SymmetricBlockMatrix: the lower slot, and whether the
-/// stored block is the transposed one because the first vertex has the smaller index.
+/// Where the 3 x 3 block of two stencil vertices lives in a SymmetricBlockMatrix: the lower slot, the stencil positions
+/// of its row and column, and whether they are swapped because the first vertex has the smaller index.
 struct LowerSlot {
   std::int32_t slot;
+  std::uint8_t row, column;
   bool transposed;
 };
 
@@ -26,7 +27,7 @@ class ShellStructure {
   const BlockPatternPtr& pattern() const { return analysis_->pattern(); }
   const CholeskyAnalysisPtr& analysis() const { return analysis_; }
 
-  /// Blocks (0,0) (1,1) (2,2) (1,0) (2,1) (0,2) of each face's corners.
+  /// Blocks (0,0) (1,1) (2,2), then (2,1) (0,2) (1,0), at the edges opposite corners 0, 1, 2, of each face's corners.
   const std::vector<std::array<LowerSlot, 6>>& faceSlots() const { return face_slots_; }
   /// Blocks (i,i), then (1,0) (2,0) (3,0) (2,1) (3,1) (3,2) of each hinge's vertices.
   const std::vector<std::array<LowerSlot, 10>>& hingeSlots() const { return hinge_slots_; }

@@ -85,3 +85,14 @@ TEST_CASE("faulty positions are refused with the place named") {
   broken.row(2) = 0.5 * shape.row(1);
   CHECK_THROWS_WITH(requireValidShape(topology, broken, "s"), Catch::Contains("s: face 0 is degenerate"));
 }
+
+TEST_CASE("faces know the hinges at their edges") {
+  const Topology tetra(4, tetrahedron), lone(3, faces({{0, 1, 2}}));
+  for (std::size_t f = 0; f < 4; ++f)
+    for (std::size_t c = 0; c < 3; ++c) {
+      const auto& hinge = tetra.hinges()[static_cast<std::size_t>(tetra.faceHinges()[f][c])];
+      CHECK(hinge.edges[0] == tetra.faceEdges()[f][c]);
+      CHECK((hinge.faces[0] == static_cast<int>(f) || hinge.faces[1] == static_cast<int>(f)));
+    }
+  CHECK(lone.faceHinges()[0] == std::array<std::int32_t, 3>{-1, -1, -1});
+}
