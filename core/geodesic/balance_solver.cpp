@@ -15,7 +15,7 @@ enum class Unknown { kDeformed, kUndeformed };
 class BalanceSolver {
  public:
   BalanceSolver(const ShellStructure& structure, double bending, const Vertices& current, Unknown unknown,
-                const Vertices& known_neighbour)
+                const Vertices& known_neighbour, double force)
       : structure_(structure),
         topology_(structure.topology()),
         bending_(bending),
@@ -31,7 +31,7 @@ class BalanceSolver {
       addSecondGradient(topology_, neighbour, current_measures_, bending_, 1, gradient);
     else
       addFirstGradient(topology_, current_measures_, neighbour, bending_, 1, gradient);
-    known_ = pullBack(gradient);
+    known_ = force * pullBack(gradient);
     floor_ = forceFloor(topology_, current_, current_measures_, bending_);
     factoriseMetric();
   }
@@ -180,13 +180,14 @@ Solved<Vertices> solveBalance(BalanceSolver solver, const Vertices& start, const
 }  // namespace
 
 Solved<Vertices> solveForDeformed(const ShellStructure& structure, double bending, const Vertices& previous,
-                                  const Vertices& current, const Vertices& start, const GeodesicOptions& options) {
-  return solveBalance(BalanceSolver(structure, bending, current, Unknown::kDeformed, previous), start, options);
+                                  const Vertices& current, const Vertices& start, const GeodesicOptions& options,
+                                  double force) {
+  return solveBalance(BalanceSolver(structure, bending, current, Unknown::kDeformed, previous, force), start, options);
 }
 
 Solved<Vertices> solveForUndeformed(const ShellStructure& structure, double bending, const Vertices& current,
                                     const Vertices& next, const Vertices& start, const GeodesicOptions& options) {
-  return solveBalance(BalanceSolver(structure, bending, current, Unknown::kUndeformed, next), start, options);
+  return solveBalance(BalanceSolver(structure, bending, current, Unknown::kUndeformed, next, 1), start, options);
 }
 
 }  // namespace shaped

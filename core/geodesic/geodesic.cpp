@@ -143,6 +143,16 @@ Solved<Vertices> GeodesicCalculus::between(const Vertices& a, const Vertices& b,
   return minimiseShell(objective, *structure_, start, newton);
 }
 
+Solved<Vertices> GeodesicCalculus::through(const Vertices& a, const Vertices& inner, double t, const GeodesicOptions& options,
+                                           const Vertices& near) const {
+  if (t == 1) return {inner, Outcome{}};
+  Vertices start = near;
+  if (start.rows() == 0)
+    start = reconstruction_->reconstruct(blendMeasures(measure(topology(), a), measure(topology(), inner), 1 / t), inner);
+  if (start.rows() == 0 || !std::isfinite(shellEnergy(topology(), inner, start, bending_))) start = inner;
+  return solveForDeformed(*structure_, bending_, a, inner, aligned(start, inner), options, (1 - t) / t);
+}
+
 Vertices GeodesicCalculus::predict(const Vertices& previous, const Vertices& current) const {
   const auto before = measure(topology(), previous), here = measure(topology(), current);
   const double step = shellEnergy(topology(), before, here, bending_);

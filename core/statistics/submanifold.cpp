@@ -183,7 +183,8 @@ Solved<SubmanifoldProjection> Submanifold::project(const Vertices& shape, const 
   SubmanifoldProjection result;
   const double distance = calculus_->distance(path.solution);
   const double nearest = distances_.head(static_cast<Eigen::Index>(vertices.size() / 2)).minCoeff();
-  result.point.scale = distance > 0 ? std::min(1.0, options.kappa * nearest / distance) : 1.0;
+  const double longest = 1.0 / pga_->path_steps;  // s_loc stays on the first segment
+  result.point.scale = distance > 0 ? std::min(longest, options.kappa * nearest / distance) : longest;
   const auto local = calculus_->at(path.solution, result.point.scale, geodesic_options);
   outcome += local;
 
@@ -196,33 +197,29 @@ Solved<SubmanifoldProjection> Submanifold::project(const Vertices& shape, const 
                                        result.local, result.local_energy);
   outcome += weights;
   result.point.alpha = weights.solution.alpha;
-  auto scaled = rescale(result.local, 1 / result.point.scale, options);
+  auto scaled = rescale(result.local, result.point.scale, path.solution[1], options);
   outcome += scaled;
   result.shape = std::move(scaled.solution);
   result.geodesic = std::move(path.solution);
   return {std::move(result), outcome};
 }
 
-Solved<Vertices> Submanifold::rescale(const Vertices& local, double factor, const SubmanifoldOptions& options) const {
-  // I(mean, local, factor) with about K steps in all: first scaled by a factor in [1/2, 2) so that doublings and then
-  // K - 1 equal steps arrive exactly; each doubling reflects the mean at the shape reached.
+Solved<Vertices> Submanifold::rescale(const Vertices& local, double scale, const Vertices& first_node,
+                                      const SubmanifoldOptions& options) const {
+  // The exact inverse of the scaling: local lies at rho K on the first segment of a K-geodesic from the mean, whose
+  // first node follows from (24) and the others by (23). So a shape whose local one is on the submanifold comes back.
   const auto geodesic_options = geodesicOptions(options);
-  const double steps = pga_->path_steps;
-  const int doublings = factor > steps ? static_cast<int>(std::floor(std::log2(factor / steps))) : 0;
-  const double marches = factor > steps ? steps : std::max(1.0, std::ceil(factor - 1e-12));
-  const double first = factor / (marches * std::pow(2.0, doublings));
-  auto scaled = calculus_->at({pga_->mean, local}, first, geodesic_options);
-  Outcome outcome = scaled;
-  Vertices here = std::move(scaled.solution), before = pga_->mean;
-  const auto advance = [&](const Vertices& previous) {
-    auto next = calculus_->extrapolate(previous, here, geodesic_options);
+  const int steps = pga_->path_steps;
+  if (scale * steps > 1) return calculus_->at({pga_->mean, local}, 1 / scale, geodesic_options);
+  auto first = calculus_->through(pga_->mean, local, scale * steps, geodesic_options, first_node);
+  Outcome outcome = first;
+  Vertices here = std::move(first.solution), before = pga_->mean;
+  for (int k = 1; k < steps && outcome.converged(); ++k) {
+    auto next = calculus_->extrapolate(before, here, geodesic_options);
     outcome += next;
     before = std::move(here);
     here = std::move(next.solution);
-  };
-  for (int k = 0; k < doublings && outcome.converged(); ++k) advance(pga_->mean);
-  before = pga_->mean;
-  for (int k = 1; k < static_cast<int>(marches) && outcome.converged(); ++k) advance(Vertices(before));
+  }
   return {std::move(here), outcome};
 }
 
@@ -236,7 +233,7 @@ Solved<Vertices> Submanifold::shapeOf(const SubmanifoldPoint& point, const Subma
     throw InvalidInput("alpha", "sums to " + std::to_string(point.alpha.sum()) + ", want 1");
   if (!(point.scale > 0) || !std::isfinite(point.scale)) throw InvalidInput("scale", "must be a positive number");
   const auto local = average(point.alpha, pga_->mean, options);
-  auto scaled = rescale(local.solution, 1 / point.scale, options);
+  auto scaled = rescale(local.solution, point.scale, {}, options);
   Outcome outcome = local;
   outcome += scaled;
   return {std::move(scaled.solution), outcome};

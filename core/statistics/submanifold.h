@@ -7,7 +7,7 @@ namespace shaped {
 /// A point of the submanifold M_J, (15)-(16) of [HZRS18]: I(mean, q(alpha), 1 / scale).
 struct SubmanifoldPoint {
   Eigen::VectorXd alpha;  ///< 2J weights of p_1 .. p_J, p_-1 .. p_-J; >= 0, sum 1
-  double scale = 1;       ///< rho of (17), in (0, 1]
+  double scale = 1;       ///< rho of (17), > 0; a projection's is at most 1 / K
 };
 
 /// Projection of one shape, with what a similar shape's projection can start from.
@@ -59,7 +59,9 @@ class Submanifold {
   Solved<SubmanifoldPoint> optimiseWeights(const ShellMeasures& target, const std::vector<std::size_t>& vertices,
                                            Eigen::VectorXd start, const SubmanifoldOptions& options, Vertices& q,
                                            double& energy) const;
-  Solved<Vertices> rescale(const Vertices& local, double factor, const SubmanifoldOptions& options) const;
+  /// I(mean, local, 1 / scale). first_node: a guess of the first node 1/K along the way, or empty.
+  Solved<Vertices> rescale(const Vertices& local, double scale, const Vertices& first_node,
+                           const SubmanifoldOptions& options) const;
 
   std::shared_ptr<const GeodesicCalculus> calculus_;
   std::shared_ptr<const ShellPga> pga_;
