@@ -102,7 +102,8 @@ ShellPgaParts partsFrom(const StoredModel& stored) {
 
 }  // namespace
 
-std::int64_t publishShellPga(const ModelDirectory& directory, const std::string& name, const ShellPgaModel& model) {
+std::int64_t publishShellPga(const ModelDirectory& directory, const std::string& name, const ShellPgaModel& model,
+                             const nlohmann::json& provenance) {
   const auto& parts = model.parts();
   TensorWriter tensors;
   tensors.addMatrix("faces", parts.topology->faces());
@@ -132,7 +133,8 @@ std::int64_t publishShellPga(const ModelDirectory& directory, const std::string&
                           {"training",
                            {{"mean", toJson(parts.training.mean)},
                             {"variations", toJson(parts.training.variations)},
-                            {"seconds", parts.training.seconds}}}};
+                            {"seconds", parts.training.seconds}}},
+                          {"provenance", provenance}};
   return directory.publish(name, std::move(manifest), tensors);
 }
 

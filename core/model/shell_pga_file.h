@@ -8,8 +8,10 @@ namespace shaped {
 /// The kind of a Shell PGA model's manifest.
 inline constexpr const char* kShellPgaKind = "shell_pga";
 
-/// Publishes a model as a new version and returns its number. Throws as ModelDirectory::publish.
-std::int64_t publishShellPga(const ModelDirectory& directory, const std::string& name, const ShellPgaModel& model);
+/// Publishes a model as a new version and returns its number. provenance: an object that stands in the manifest's
+/// description, for whoever keeps the store; the model does not read it. Throws as ModelDirectory::publish.
+std::int64_t publishShellPga(const ModelDirectory& directory, const std::string& name, const ShellPgaModel& model,
+                             const nlohmann::json& provenance = nlohmann::json::object());
 
 /// Builds the model that a stored version holds. Throws FileError naming the version when the kind or format version is
 /// another, or tensors are missing, of the wrong shape, or make no valid mesh.
