@@ -28,6 +28,9 @@ class Arguments {
                       const std::string& help) = 0;
   virtual void option(const std::string& flags, std::optional<double>& value, const std::string& value_name,
                       const std::string& help) = 0;
+  /// One word or more after the flag.
+  virtual void option(const std::string& flags, std::vector<std::string>& values, const std::string& value_name,
+                      const std::string& help) = 0;
   virtual void flag(const std::string& flags, bool& value, const std::string& help) = 0;
   /// Makes the option declared last a required one.
   virtual void required() = 0;

@@ -42,6 +42,10 @@ class CliArguments : public Arguments {
               const std::string& help) override {
     add(flags, value, value_name, help);
   }
+  void option(const std::string& flags, std::vector<std::string>& values, const std::string& value_name,
+              const std::string& help) override {
+    add(flags, values, value_name, help);
+  }
   void flag(const std::string& flags, bool& value, const std::string& help) override {
     last_ = app_.add_flag(flags, value, help);
   }

@@ -1,7 +1,10 @@
 #include "client/shapectl/interrupt.h"
 
+#include <semaphore.h>
 #include <unistd.h>
 
+#include <atomic>
+#include <cerrno>
 #include <csignal>
 
 #include "client/shapectl/exit_code.h"
@@ -9,31 +12,43 @@
 namespace shaped::shapectl {
 namespace {
 
-// SIGUSR1 is ours alone: it ends the waiting thread when the program is done.
-sigset_t handledSignals() {
-  sigset_t signals;
-  sigemptyset(&signals);
-  for (const int signal : {SIGINT, SIGTERM, SIGUSR1}) sigaddset(&signals, signal);
-  return signals;
+// A stop token's callbacks may not run in a signal handler; posting a semaphore may.
+sem_t wake_up;
+std::atomic<int> signals{0};
+std::atomic<bool> finished{false};
+
+void onSignal(int) {
+  if (++signals > 1) _exit(static_cast<int>(ExitCode::kCancelled));
+  sem_post(&wake_up);
+}
+
+void handle(int signal) {
+  struct sigaction before {};
+  sigaction(signal, nullptr, &before);
+  if (before.sa_handler == SIG_IGN) return;
+  struct sigaction action {};
+  action.sa_handler = onSignal;
+  action.sa_flags = SA_RESTART;
+  sigaction(signal, &action, nullptr);
 }
 
 }  // namespace
 
 Interrupt::Interrupt() {
-  const auto signals = handledSignals();
-  pthread_sigmask(SIG_BLOCK, &signals, nullptr);
-  thread_ = std::thread([this] { waitForSignals(); });
+  sem_init(&wake_up, 0, 0);
+  thread_ = std::thread([this] {
+    while (sem_wait(&wake_up) != 0 && errno == EINTR) {
+    }
+    if (!finished) source_.request_stop();
+  });
+  handle(SIGINT);
+  handle(SIGTERM);
 }
 
 Interrupt::~Interrupt() {
-  pthread_kill(thread_.native_handle(), SIGUSR1);
+  finished = true;
+  sem_post(&wake_up);
   thread_.join();
-}
-
-void Interrupt::waitForSignals() {
-  const auto signals = handledSignals();
-  for (int signal = 0; sigwait(&signals, &signal) == 0 && signal != SIGUSR1;)
-    if (!source_.request_stop()) _exit(static_cast<int>(ExitCode::kCancelled));
 }
 
 }  // namespace shaped::shapectl

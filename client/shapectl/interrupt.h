@@ -6,8 +6,8 @@
 namespace shaped::shapectl {
 
 /// Turns Ctrl-C (SIGINT) and SIGTERM into a stop token: the first one asks for a clean end, the second ends the program
-/// at once with the code for "cancelled". Create it first in main, before any thread, which then all leave the signals
-/// to it.
+/// at once with the code for "cancelled". A signal that the parent had set to be ignored stays ignored. One object a
+/// program.
 class Interrupt {
  public:
   Interrupt();
@@ -15,8 +15,6 @@ class Interrupt {
   std::stop_token token() const { return source_.get_token(); }
 
  private:
-  void waitForSignals();
-
   std::stop_source source_;
   std::thread thread_;
 };

@@ -4,8 +4,11 @@ namespace shaped::shapectl {
 
 std::vector<Verb> allVerbs() {
   return {
-      modelsVerb(), describeVerb(), deleteVerb(),  //
-      jobsVerb(),   watchVerb(),    cancelVerb(),
+      trainVerb(),                                                     //
+      modelsVerb(),  describeVerb(),   deleteVerb(),                   //
+      jobsVerb(),    watchVerb(),      cancelVerb(),                   //
+      projectVerb(), synthesizeVerb(), interpolateVerb(), editVerb(),  //
+      fitVerb(),     scoreVerb(),      evaluateVerb(),                 //
   };
 }
 

@@ -6,12 +6,20 @@
 
 namespace shaped::shapectl {
 
+Verb trainVerb();
 Verb modelsVerb();
 Verb describeVerb();
 Verb deleteVerb();
 Verb jobsVerb();
 Verb watchVerb();
 Verb cancelVerb();
+Verb projectVerb();
+Verb synthesizeVerb();
+Verb interpolateVerb();
+Verb editVerb();
+Verb fitVerb();
+Verb scoreVerb();
+Verb evaluateVerb();
 
 /// Every verb, in the order of the help.
 std::vector<Verb> allVerbs();

@@ -1,0 +1,13 @@
+#pragma once
+
+#include <cstdint>
+#include <string>
+#include <vector>
+
+namespace shaped::shapectl {
+
+/// Frame indices of "a:b:step" as Python slices: from a to before b; parts may be left out, negative a and b count from
+/// the end. Empty text: all frames. Throws InvalidInput naming "--frames" when it is none of that or selects nothing.
+std::vector<std::int64_t> framesOf(const std::string& range, std::int64_t frame_count);
+
+}  // namespace shaped::shapectl
