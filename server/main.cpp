@@ -1,3 +1,6 @@
+#include <semaphore.h>
+
+#include <cerrno>
 #include <csignal>
 #include <iostream>
 #include <thread>
@@ -11,13 +14,27 @@ namespace {
 
 using namespace shaped;
 
-int serve(const server::DaemonOptions& options, const sigset_t& signals) {
+sem_t stop_asked;
+
+// Handlers, not a signal mask with sigwait: libraries start threads before main, which no mask of ours reaches.
+void stopOnSignals() {
+  sem_init(&stop_asked, 0, 0);
+  struct sigaction action {};
+  action.sa_handler = [](int) { sem_post(&stop_asked); };
+  action.sa_flags = SA_RESTART;
+  sigaction(SIGINT, &action, nullptr);
+  sigaction(SIGTERM, &action, nullptr);
+  // A file over the size limit is an error to report, not to die of.
+  signal(SIGXFSZ, SIG_IGN);
+}
+
+int serve(const server::DaemonOptions& options) {
   server::startLog(options.log);
   server::Daemon daemon(options);
   server::logInfo("listening on " + daemon.address() + ", store " + options.store.string() + ", " +
                   std::to_string(options.threads) + " threads");
-  int signal = 0;
-  sigwait(&signals, &signal);
+  while (sem_wait(&stop_asked) != 0 && errno == EINTR) {
+  }
   server::logInfo("stopping");
   daemon.shutdown(std::chrono::seconds(5));
   server::logInfo("stopped");
@@ -27,12 +44,7 @@ int serve(const server::DaemonOptions& options, const sigset_t& signals) {
 }  // namespace
 
 int main(int argc, char** argv) {
-  // Before any thread: all of them leave the signals to sigwait.
-  sigset_t signals;
-  sigemptyset(&signals);
-  sigaddset(&signals, SIGINT);
-  sigaddset(&signals, SIGTERM);
-  pthread_sigmask(SIG_BLOCK, &signals, nullptr);
+  stopOnSignals();
   limitLibraryThreads();
   try {
     const auto processors = static_cast<int>(std::max(1U, std::thread::hardware_concurrency()));
@@ -41,7 +53,7 @@ int main(int argc, char** argv) {
       std::cout << server::usage();
       return 0;
     }
-    return serve(*options, signals);
+    return serve(*options);
   } catch (const InvalidInput& error) {
     std::cerr << "shaped: " << error.what() << "\n";
     return 2;

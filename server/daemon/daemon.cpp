@@ -5,27 +5,45 @@
 #include <grpcpp/server_builder.h>
 
 #include "core/numerics/error.h"
-#include "core/numerics/threads.h"
+#include "server/jobs/arena.h"
 #include "server/rpc/limits.h"
+#include "server/rpc/training.h"
 
 namespace shaped::server {
 namespace {
 
 // Lists, uploads and deletions: short, often waiting for the disk.
 constexpr int kLightThreads = 2;
+constexpr std::chrono::hours kLongestHeavyCall(12);
+constexpr AdmissionLimits kHeavyLimits{.queue_length = 8, .queue_bytes = 64 << 20, .open_streams = 1};
+
+/// One request, one thread: parallel loops inside a solver stay in the worker's own arena of one.
+void alone(const std::function<void()>& serve) { runInArena(1, serve); }
 
 }  // namespace
 
 Daemon::Daemon(const DaemonOptions& options)
     : lock_(options.store),
+      models_(options.store / "models"),
       datasets_(options.store / "datasets"),
-      pool_(options.threads, options.limits, limitOpenMpInThisThread),
-      light_(kLightThreads, options.limits, {}),
+      pool_(options.threads, options.limits, alone),
+      light_(kLightThreads, options.limits, alone),
+      heavy_(1, kHeavyLimits, {}),
       jobs_(job_registry_, {.running = 1, .waiting = 64, .threads = options.threads}),
-      runtime_{pool_, light_, timer_, std::chrono::duration<double>(options.longest_call)},
+      runtime_{pool_,
+               light_,
+               heavy_,
+               timer_,
+               std::chrono::duration<double>(options.longest_call),
+               kLongestHeavyCall,
+               options.threads},
+      models_service_(runtime_, models_),
       datasets_service_(runtime_, datasets_),
-      jobs_service_(runtime_, job_registry_, jobs_, {}),
-      shapes_service_(runtime_) {
+      jobs_service_(runtime_, job_registry_, jobs_,
+                    [training = TrainingContext{datasets_, models_, jobs_,
+                                                std::chrono::duration<double>(options.publish_patience)}](
+                        const v1::TrainRequest& request) { return startTraining(training, request); }),
+      shapes_service_(runtime_, models_, datasets_) {
   listen(options.listen);
 }
 
@@ -40,8 +58,8 @@ void Daemon::listen(const std::string& address) {
   // Two daemons on one port would share its connections at random.
   builder.AddChannelArgument(GRPC_ARG_ALLOW_REUSEPORT, 0);
   for (grpc::Service* service :
-       {static_cast<grpc::Service*>(&datasets_service_), static_cast<grpc::Service*>(&jobs_service_),
-        static_cast<grpc::Service*>(&shapes_service_)})
+       {static_cast<grpc::Service*>(&models_service_), static_cast<grpc::Service*>(&datasets_service_),
+        static_cast<grpc::Service*>(&jobs_service_), static_cast<grpc::Service*>(&shapes_service_)})
     builder.RegisterService(service);
   server_ = builder.BuildAndStart();
   const bool by_port = !address.starts_with("unix:");

@@ -10,6 +10,7 @@
 #include "server/jobs/job_runner.h"
 #include "server/rpc/datasets_service.h"
 #include "server/rpc/jobs_service.h"
+#include "server/rpc/models_service.h"
 #include "server/rpc/shapes_service.h"
 
 namespace shaped::server {
@@ -34,12 +35,14 @@ class Daemon {
   void listen(const std::string& address);
 
   const StoreLock lock_;
+  ModelStore models_;
   DatasetStore datasets_;
   MemoryJobRegistry job_registry_;
   DeadlineTimer timer_;
-  WorkerPool pool_, light_;
+  WorkerPool pool_, light_, heavy_;
   JobRunner jobs_;
   Runtime runtime_;
+  ModelsService models_service_;
   DatasetsService datasets_service_;
   JobsService jobs_service_;
   ShapesService shapes_service_;

@@ -33,6 +33,8 @@ const std::map<std::string, Setter>& setters() {
        [](auto& options, auto& name, auto& value) { options.threads = static_cast<int>(countOf(name, value, 1024)); }},
       {"--longest-call",
        [](auto& options, auto& name, auto& value) { options.longest_call = numberOf(name, value, 0.001, 1e6); }},
+      {"--publish-patience",
+       [](auto& options, auto& name, auto& value) { options.publish_patience = numberOf(name, value, 0, 1e6); }},
       {"--queue-length",
        [](auto& options, auto& name, auto& value) { options.limits.queue_length = countOf(name, value, 1 << 20); }},
       {"--queue-megabytes", [](auto& options, auto& name,
@@ -68,6 +70,7 @@ std::string usage() {
          "  --store DIR           folder of models and datasets, made when missing\n"
          "  --threads N           solver threads, and threads of the training job (all processors)\n"
          "  --longest-call S      cap on a call, and on a stream's time between messages [s] (600)\n"
+         "  --publish-patience S  how long a trained model waits for room on a full disk [s] (300)\n"
          "  --queue-length N      requests that may wait for a solver thread (256)\n"
          "  --queue-megabytes N   their messages together (512)\n"
          "  --open-streams N      streams at a time (64)\n"

@@ -14,6 +14,7 @@ struct DaemonOptions {
   std::filesystem::path store;             ///< models and datasets; made when missing
   int threads = 1;                         ///< of the solvers, and of the training job, 1 .. 1024
   double longest_call = 600;               ///< cap on a call, and on a stream's time between messages [s], > 0
+  double publish_patience = 300;           ///< how long a trained model waits for room on a full disk [s], >= 0
   AdmissionLimits limits;
   std::string log = "info";  ///< debug, info, warn, error
 };

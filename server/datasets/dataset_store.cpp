@@ -13,7 +13,7 @@ namespace {
 
 namespace fs = std::filesystem;
 
-constexpr char kFrames[] = "frames.npy", kFaces[] = "faces.npy", kInfo[] = "dataset.json";
+constexpr char kFrames[] = "frames.npy", kFaces[] = "faces.npy", kInfo[] = "dataset.json", kTemplate[] = "template.npy";
 constexpr char kScratchPrefix[] = ".scratch-";  // no dataset's name begins with a dot
 
 void writeInfo(const fs::path& folder, const DatasetInfo& info) {
@@ -50,7 +50,9 @@ Faces readFaces(const fs::path& folder) {
 }
 
 bool sameContent(const fs::path& one, const fs::path& other) {
-  for (const char* file : {kFaces, kFrames}) {
+  for (const char* file : {kFaces, kFrames, kTemplate}) {
+    if (fs::exists(one / file) != fs::exists(other / file)) return false;
+    if (!fs::exists(one / file)) continue;
     if (fs::file_size(one / file) != fs::file_size(other / file)) return false;
     if (readFile(one / file) != readFile(other / file)) return false;
   }
@@ -79,6 +81,11 @@ DatasetUpload::~DatasetUpload() {
   writer_.reset();
   std::error_code ignored;  // what stays behind is removed at the next start
   fs::remove_all(folder_, ignored);
+}
+
+void DatasetUpload::setTemplate(const Vertices& shape) {
+  requireValidShape(*topology_, shape, "template");
+  writeFrames(folder_ / kTemplate, {shape});
 }
 
 void DatasetUpload::append(const Vertices& shape, const std::string& label) {
@@ -162,8 +169,11 @@ Dataset DatasetStore::load(const std::string& name) const {
     auto shapes = readFrames(folder / kFrames);
     if (topology->id() != info.topology_id || std::ssize(shapes) != info.frames)
       throw Corrupted("dataset \"" + name + "\" does not hold what was uploaded; delete it and upload it again");
+    std::optional<Vertices> template_shape;
+    if (fs::exists(folder / kTemplate)) template_shape = readFrames(folder / kTemplate).front();
     for (const auto& shape : shapes) requireValidShape(*topology, shape, name);
-    return {std::move(topology), std::move(shapes)};
+    if (template_shape) requireValidShape(*topology, *template_shape, name);
+    return {std::move(topology), std::move(shapes), std::move(template_shape)};
   } catch (const InvalidInput& error) {
     get(name);  // deleted while we read it: NotFound says so
     throw Corrupted("dataset \"" + name + "\" cannot be read: " + error.what());

@@ -27,7 +27,8 @@ struct DatasetInfo {
 /// Shapes that share a connectivity.
 struct Dataset {
   TopologyPtr topology;
-  std::vector<Vertices> shapes;  ///< V x 3 each, metres
+  std::vector<Vertices> shapes;            ///< V x 3 each, metres
+  std::optional<Vertices> template_shape;  ///< V x 3: marker offsets are given in its axes
 };
 
 class DatasetStore;
@@ -40,6 +41,9 @@ class DatasetUpload {
   DatasetUpload& operator=(const DatasetUpload&) = delete;
 
   const Topology& topology() const { return *topology_; }
+  /// Keeps a template beside the frames. Throws InvalidInput naming "template" when it is faulty, FileError when the
+  /// disk fails.
+  void setTemplate(const Vertices& shape);
   /// label: what errors call the frame beside its index. Throws InvalidInput naming frame and vertex or face when the
   /// shape is faulty or one too many; FileError when the disk fails.
   void append(const Vertices& shape, const std::string& label);
@@ -60,7 +64,8 @@ class DatasetUpload {
   std::optional<FrameWriter> writer_;
 };
 
-/// Datasets under <root>/<name>/: frames.npy (n x V x 3 floats), faces.npy (F x 3), dataset.json. They appear and go by
+/// Datasets under <root>/<name>/: frames.npy (n x V x 3 floats), faces.npy (F x 3), dataset.json, and
+/// template.npy (1 x V x 3) where there is one. They appear and go by
 /// one rename each, so a crash leaves whole datasets and rubbish that the next start removes. Safe from any thread.
 class DatasetStore {
  public:

@@ -4,6 +4,7 @@
 #include <system_error>
 
 #include "core/io/file_error.h"
+#include "core/io/model_directory.h"
 #include "core/numerics/error.h"
 #include "server/errors/errors.h"
 
@@ -11,13 +12,6 @@ namespace shaped::server {
 namespace {
 
 using grpc::Status;
-
-// FileError carries the system's reason as text only.
-bool saysDiskFull(const std::string& text) {
-  for (const int reason : {ENOSPC, EDQUOT})
-    if (text.find(std::generic_category().message(reason)) != std::string::npos) return true;
-  return false;
-}
 
 Status fileStatus(const std::string& text) {
   if (saysDiskFull(text)) return {grpc::RESOURCE_EXHAUSTED, text + "; free space in the store and try again"};
@@ -36,6 +30,8 @@ Status unboundedStatusOf(const std::exception_ptr& error, StopReason stopped) {
     std::rethrow_exception(error);
   } catch (const Stopped&) {
     return stoppedStatus(stopped);
+  } catch (const ModelNotFound& problem) {
+    return {grpc::NOT_FOUND, problem.what()};
   } catch (const InvalidInput& problem) {
     return {grpc::INVALID_ARGUMENT, problem.what()};
   } catch (const NotFound& problem) {
@@ -60,6 +56,12 @@ Status unboundedStatusOf(const std::exception_ptr& error, StopReason stopped) {
 }
 
 }  // namespace
+
+bool saysDiskFull(const std::string& text) {
+  for (const int reason : {ENOSPC, EDQUOT, EFBIG})
+    if (text.find(std::generic_category().message(reason)) != std::string::npos) return true;
+  return false;
+}
 
 Status statusOf(const std::exception_ptr& error, StopReason stopped) {
   const auto status = unboundedStatusOf(error, stopped);

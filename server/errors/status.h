@@ -10,14 +10,17 @@
 namespace shaped::server {
 
 /// The status for an exception that ended a request; the one place where this is decided.
-///   InvalidInput -> INVALID_ARGUMENT (the text names the field)   NotFound -> NOT_FOUND   AlreadyExists ->
-///   ALREADY_EXISTS Busy -> RESOURCE_EXHAUSTED   Corrupted -> DATA_LOSS   Stopped -> see stoppedStatus FileError and
-///   system errors -> RESOURCE_EXHAUSTED when the disk is full, else INTERNAL std::bad_alloc -> RESOURCE_EXHAUSTED
-///   anything else -> INTERNAL
+///   ModelNotFound -> NOT_FOUND, any other InvalidInput -> INVALID_ARGUMENT (the text names the field)   NotFound ->
+///   NOT_FOUND   AlreadyExists -> ALREADY_EXISTS Busy -> RESOURCE_EXHAUSTED   Corrupted -> DATA_LOSS   Stopped -> see
+///   stoppedStatus FileError and system errors -> RESOURCE_EXHAUSTED when the disk is full, else INTERNAL
+///   std::bad_alloc -> RESOURCE_EXHAUSTED anything else -> INTERNAL
 grpc::Status statusOf(const std::exception_ptr& error, StopReason stopped);
 
 /// The client went away: CANCELLED; time is up: DEADLINE_EXCEEDED.
 grpc::Status stoppedStatus(StopReason reason);
+
+/// Whether a FileError's text gives a full disk, quota or size limit as the system's reason.
+bool saysDiskFull(const std::string& text);
 
 /// "INVALID_ARGUMENT" and so on.
 std::string nameOf(grpc::StatusCode code);

@@ -1,24 +1,13 @@
 #include "server/jobs/job_runner.h"
 
-#include <tbb/task_arena.h>
-#include <tbb/task_scheduler_observer.h>
-
 #include <algorithm>
 
-#include "core/numerics/threads.h"
 #include "server/errors/errors.h"
 #include "server/errors/status.h"
+#include "server/jobs/arena.h"
 
 namespace shaped::server {
 namespace {
-
-/// OpenMP's limit is not inherited, so every thread that joins the arena sets it for itself.
-class OpenMpLimit final : public tbb::task_scheduler_observer {
- public:
-  explicit OpenMpLimit(tbb::task_arena& arena) : tbb::task_scheduler_observer(arena) { observe(true); }
-  ~OpenMpLimit() override { observe(false); }
-  void on_scheduler_entry(bool) override { limitOpenMpInThisThread(); }
-};
 
 void markCancelled(JobRecord& record) {
   record.state = JobState::kCancelled;
@@ -55,8 +44,7 @@ std::uint64_t numberOf(const std::string& id) { return std::stoull(id); }
 JobRunner::JobRunner(JobRegistry& registry, const JobLimits& limits)
     : registry_(registry),
       limits_(limits),
-      pool_(limits.running, {.queue_length = limits.waiting, .queue_bytes = 1, .open_streams = 1},
-            limitOpenMpInThisThread) {}
+      pool_(limits.running, {.queue_length = limits.waiting, .queue_bytes = 1, .open_streams = 1}, {}) {}
 
 JobRunner::~JobRunner() { cancelAll(); }
 
@@ -113,9 +101,8 @@ void JobRunner::run(const std::string& id, const Work& work, std::stop_token sto
     });
   };
   try {
-    tbb::task_arena arena(limits_.threads);
-    const OpenMpLimit limit(arena);
-    const auto result = arena.execute([&] { return work(progress, stop); });
+    JobResult result;
+    runInArena(limits_.threads, [&] { result = work(progress, stop); });
     registry_.update(id, [&](JobRecord& record) { markEnded(record, result); });
   } catch (const Stopped&) {
     registry_.update(id, markCancelled);

@@ -19,11 +19,11 @@ double secondsSince(std::chrono::steady_clock::time_point begin) {
 
 }  // namespace
 
-Call::Call(Runtime& runtime, grpc::CallbackServerContext& context, std::string method)
-    : runtime_(runtime),
-      context_(context),
+Call::Call(grpc::CallbackServerContext& context, std::string method, std::chrono::duration<double> cap)
+    : context_(context),
       id_(nextRequestId()),
       method_(std::move(method)),
+      cap_(cap),
       arrival_(std::chrono::steady_clock::now()),
       work_begin_(arrival_) {}
 
@@ -62,7 +62,7 @@ grpc::Status Call::refusal(const Decision& decision) {
 }
 
 DeadlineTimer::Clock::time_point Call::deadline() const {
-  const auto cap = std::chrono::duration_cast<DeadlineTimer::Clock::duration>(runtime_.longest_call);
+  const auto cap = std::chrono::duration_cast<DeadlineTimer::Clock::duration>(cap_);
   return std::min(context_.deadline(), DeadlineTimer::Clock::now() + cap);
 }
 

@@ -20,15 +20,19 @@ namespace shaped::server {
 struct Runtime {
   WorkerPool& pool;   ///< solvers
   WorkerPool& light;  ///< what takes milliseconds and must work while the solvers are busy: lists, uploads, jobs
+  WorkerPool& heavy;  ///< what takes minutes and must not keep others from a solver: evaluations
   DeadlineTimer& timer;
   std::chrono::duration<double> longest_call;  ///< cap on a call's deadline; for streams, on the time between messages
+  std::chrono::duration<double> longest_heavy_call;
+  int threads;  ///< of the arena of one heavy call
 };
 
 /// What every call has, whatever its shape: an id, a deadline, a stop token, one line in the log.
-/// Handlers see this class; the reactors that own it are in unary_call.h and stream_call.h.
+/// Handlers see this class; the reactors that own it are in unary_call.h, server_stream_call.h and incoming_stream_call.h.
 class Call {
  public:
-  Call(Runtime& runtime, grpc::CallbackServerContext& context, std::string method);
+  /// cap: the longest that the server works on it, whatever the client's deadline.
+  Call(grpc::CallbackServerContext& context, std::string method, std::chrono::duration<double> cap);
 
   std::uint64_t id() const { return id_; }
   /// Fires when the client cancels or goes away, the deadline passes, or the daemon stops. Give it to every solver.
@@ -56,10 +60,10 @@ class Call {
   bool finishOnce(const grpc::Status& status);
 
  private:
-  Runtime& runtime_;
   grpc::CallbackServerContext& context_;
   const std::uint64_t id_;
   const std::string method_;
+  const std::chrono::duration<double> cap_;
   const std::chrono::steady_clock::time_point arrival_;
   std::chrono::steady_clock::time_point work_begin_;
   std::mutex model_mutex_;  // a deadline may end the call while a worker names the model

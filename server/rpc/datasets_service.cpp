@@ -35,6 +35,9 @@ class UploadHandler final : public StreamHandler<v1::UploadDatasetRequest, v1::U
     auto faces = facesFromProto(header.faces(), header.vertex_count(), "header.faces");
     upload_ = store_.begin(header.name(), static_cast<std::int32_t>(header.vertex_count()), std::move(faces),
                            header.frames());
+    if (header.template_positions().empty()) return;
+    const auto field = "header.template_positions";
+    upload_->setTemplate(pointsFromProto(header.template_positions(), upload_->topology().vertexCount(), field));
   }
 
   void append(const v1::UploadDatasetRequest::Frame& frame) {

@@ -26,7 +26,7 @@ class ServerStreamCall final : public grpc::ServerWriteReactor<Response>,
       : runtime_(runtime),
         pool_(pool),
         context_(context),
-        call_(runtime, context, std::move(method)),
+        call_(context, std::move(method), runtime.longest_call),
         request_(request),
         handler_(std::move(handler)) {}
 

@@ -5,12 +5,9 @@
 
 namespace shaped::server {
 
-WorkerPool::WorkerPool(int threads, AdmissionLimits limits, std::function<void()> prepare) : limits_(limits) {
+WorkerPool::WorkerPool(int threads, AdmissionLimits limits, const Around& around) : limits_(limits) {
   for (int i = 0; i < threads; ++i)
-    threads_.emplace_back([this, prepare] {
-      if (prepare) prepare();
-      serve();
-    });
+    threads_.emplace_back([this, around] { around ? around([this] { serve(); }) : serve(); });
 }
 
 WorkerPool::~WorkerPool() {

@@ -18,8 +18,11 @@ namespace shaped::server {
 /// the work never runs, or a worker has taken it.
 class WorkerPool {
  public:
-  /// threads >= 1. prepare: run by every thread first, for settings that threads do not inherit.
-  WorkerPool(int threads, AdmissionLimits limits, std::function<void()> prepare);
+  /// Runs a worker's whole life, `serve`, inside whatever settings it makes for its thread. Empty: just serve.
+  using Around = std::function<void(const std::function<void()>& serve)>;
+
+  /// threads >= 1.
+  WorkerPool(int threads, AdmissionLimits limits, const Around& around);
   /// Finishes what runs; drops what waits.
   ~WorkerPool();
   WorkerPool(const WorkerPool&) = delete;

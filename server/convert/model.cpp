@@ -1,0 +1,76 @@
+#include "server/convert/model.h"
+
+#include "core/numerics/error.h"
+#include "server/convert/report.h"
+#include "server/convert/time.h"
+
+namespace shaped::server {
+namespace {
+
+void setIdentity(const std::string& name, std::uint64_t version, const ModelManifest& manifest,
+                 v1::ModelDescription& description) {
+  description.mutable_model()->set_name(name);
+  description.mutable_model()->set_version(version);
+  description.set_kind(manifest.kind);
+  const auto provenance = provenanceOf(manifest);
+  description.set_dataset(provenance.dataset);
+  if (provenance.created.time_since_epoch().count() > 0) toProto(provenance.created, *description.mutable_created());
+}
+
+}  // namespace
+
+void toProto(const ModelStore::Entry& entry, v1::ModelDescription& description) {
+  setIdentity(entry.name, entry.version, entry.manifest, description);
+  const auto& json = entry.manifest.description;
+  description.set_topology_id(json.value("topology", ""));
+  description.set_vertex_count(json.value("vertices", 0U));
+  description.set_face_count(json.value("faces", 0U));
+  auto& pga = *description.mutable_shell_pga();
+  pga.set_training_shapes(json.value("training_shapes", 0U));
+  pga.set_modes(json.value("modes", 0U));
+  pga.set_path_steps(json.value("path_steps", 0U));
+  pga.set_coarse_vertices(json.value("coarse_vertices", 0U));
+  pga.set_bending(json.value("bending", 0.0));
+}
+
+void toProto(const ServedModel& model, v1::ModelDescription& description) {
+  setIdentity(model.name, model.version, model.manifest, description);
+  const auto& parts = model.shell_pga->parts();
+  description.set_topology_id(parts.topology->id());
+  description.set_vertex_count(static_cast<std::uint32_t>(parts.topology->vertexCount()));
+  description.set_face_count(static_cast<std::uint32_t>(parts.topology->faces().rows()));
+  toProto(parts.training.combined(), parts.training.seconds, *description.mutable_training());
+  auto& pga = *description.mutable_shell_pga();
+  pga.set_training_shapes(static_cast<std::uint32_t>(parts.training.shapes));
+  pga.set_modes(static_cast<std::uint32_t>(model.shell_pga->modes()));
+  pga.set_path_steps(static_cast<std::uint32_t>(parts.pga.path_steps));
+  pga.set_coarse_vertices(static_cast<std::uint32_t>(parts.coarsening.coarse->vertexCount()));
+  pga.set_bending(parts.bending);
+  for (const double value : parts.pga.eigenvalues) pga.add_eigenvalues(value);
+}
+
+SubmanifoldPoint coefficientsFromProto(const v1::Coefficients& coefficients) {
+  SubmanifoldPoint point;
+  point.alpha = Eigen::Map<const Eigen::VectorXd>(coefficients.alpha().data(), coefficients.alpha_size());
+  point.scale = coefficients.scale();
+  return point;
+}
+
+void toProto(const SubmanifoldPoint& point, v1::Coefficients& coefficients) {
+  coefficients.mutable_alpha()->Add(point.alpha.begin(), point.alpha.end());
+  coefficients.set_scale(point.scale);
+}
+
+void toProto(const ShellPgaScore& score, v1::Score& message) {
+  message.set_mahalanobis(score.mahalanobis);
+  message.set_log_likelihood(score.log_likelihood);
+  message.set_residual_distance(score.residual_distance);
+}
+
+int countFromProto(std::uint32_t value, int most, const std::string& field) {
+  if (value > static_cast<std::uint32_t>(most))
+    throw InvalidInput(field, "= " + std::to_string(value) + ", want at most " + std::to_string(most));
+  return static_cast<int>(value);
+}
+
+}  // namespace shaped::server

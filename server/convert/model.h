@@ -1,0 +1,22 @@
+#pragma once
+
+#include "core/model/shell_pga_tasks.h"
+#include "server/models/model_store.h"
+#include "shaped/v1/model.pb.h"
+
+namespace shaped::server {
+
+/// What the manifest says; eigenvalues are not in it.
+void toProto(const ModelStore::Entry& entry, v1::ModelDescription& description);
+/// Everything.
+void toProto(const ServedModel& model, v1::ModelDescription& description);
+
+/// The weights as they came; whether they are a point of a model is for the model to say.
+SubmanifoldPoint coefficientsFromProto(const v1::Coefficients& coefficients);
+void toProto(const SubmanifoldPoint& point, v1::Coefficients& coefficients);
+void toProto(const ShellPgaScore& score, v1::Score& message);
+
+/// Throws InvalidInput naming `field` when the number is above `most`.
+int countFromProto(std::uint32_t value, int most, const std::string& field);
+
+}  // namespace shaped::server

@@ -1,0 +1,29 @@
+#pragma once
+
+#include "server/convert/report.h"
+#include "server/errors/errors.h"
+#include "server/models/model_store.h"
+#include "server/rpc/call.h"
+
+namespace shaped::server {
+
+/// Pins the model that a request names and notes it for the log.
+template <class Request>
+ServedModelPtr pinModel(ModelStore& store, const Request& request, Call& call) {
+  auto model = store.pin(request.model().name(), request.model().version());
+  call.setModel(model->name, model->version);
+  return model;
+}
+
+/// Fills what every answer carries. Throws Stopped when the solver was cancelled: then there is no answer.
+template <class Response>
+void setAnswer(const ServedModel& model, const Outcome& outcome, double smallest_area_ratio, const Call& call,
+               Response& response) {
+  if (outcome.termination == Termination::kCancelled) throw Stopped();
+  response.mutable_model()->set_name(model.name);
+  response.mutable_model()->set_version(model.version);
+  toProto(outcome, call.workSeconds(), *response.mutable_report());
+  response.set_smallest_area_ratio(smallest_area_ratio);
+}
+
+}  // namespace shaped::server

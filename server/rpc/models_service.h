@@ -1,0 +1,25 @@
+#pragma once
+
+#include "server/models/model_store.h"
+#include "server/rpc/call.h"
+#include "shaped/v1/models.grpc.pb.h"
+
+namespace shaped::server {
+
+class ModelsService final : public v1::Models::CallbackService {
+ public:
+  ModelsService(Runtime& runtime, ModelStore& store) : runtime_(runtime), store_(store) {}
+
+  grpc::ServerUnaryReactor* List(grpc::CallbackServerContext* context, const v1::ListModelsRequest* request,
+                                 v1::ListModelsResponse* response) override;
+  grpc::ServerUnaryReactor* Get(grpc::CallbackServerContext* context, const v1::GetModelRequest* request,
+                                v1::GetModelResponse* response) override;
+  grpc::ServerUnaryReactor* Delete(grpc::CallbackServerContext* context, const v1::DeleteModelRequest* request,
+                                   v1::DeleteModelResponse* response) override;
+
+ private:
+  Runtime& runtime_;
+  ModelStore& store_;
+};
+
+}  // namespace shaped::server
