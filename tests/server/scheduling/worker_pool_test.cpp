@@ -35,10 +35,14 @@ TEST_CASE("work runs in the order of its arrival") {
   CHECK(order == std::vector<int>{0, 1, 2, 3, 4});
 }
 
-TEST_CASE("every worker is prepared before its first work") {
+TEST_CASE("every worker lives inside its surroundings") {
   std::atomic<int> prepared{0}, seen{0};
   {
-    WorkerPool pool(1, {}, [&] { ++prepared; });
+    WorkerPool pool(1, {}, [&](const auto& serve) {
+      ++prepared;
+      serve();
+      prepared = -1;
+    });
     std::promise<void> done;
     pool.submit(1, 0, Entry::kCall, [&] {
       seen = prepared.load();
@@ -47,6 +51,7 @@ TEST_CASE("every worker is prepared before its first work") {
     done.get_future().wait();
   }
   CHECK(seen == 1);
+  CHECK(prepared == -1);
 }
 
 TEST_CASE("a full queue refuses, and withdrawing makes room") {

@@ -1,0 +1,154 @@
+"""A daemon, a client and small meshes for the end-to-end tests."""
+
+import json
+import os
+import pathlib
+import re
+import signal
+import subprocess
+import tempfile
+import unittest
+
+import numpy
+
+BINARIES = pathlib.Path(os.environ["SHAPED_BINARIES"])
+
+# What shapectl returns to the shell, as docs/api.md says.
+SUCCESS, INTERNAL, BAD_INPUT, NOT_FOUND, UNAVAILABLE, DEADLINE, CANCELLED, NOT_CONVERGED = range(8)
+
+
+class Daemon:
+    """A shaped process on a free port of the loopback."""
+
+    def __init__(self, store, *options, preexec=None):
+        self.process = subprocess.Popen(
+            [BINARIES / "shaped", "--listen", "127.0.0.1:0", "--store", store, *options],
+            stderr=subprocess.PIPE, text=True, preexec_fn=preexec)
+        self.address = None
+        lines = []
+        for line in self.process.stderr:
+            lines.append(line)
+            found = re.search(r"listening on (\S+),", line)
+            if found:
+                self.address = found.group(1)
+                break
+        if self.address is None:
+            self.process.stderr.close()
+            raise RuntimeError(f"shaped ended with {self.process.wait()}: {' '.join(lines)}")
+
+    def running(self):
+        return self.process.poll() is None
+
+    def stop(self, how=signal.SIGTERM):
+        """Ends it, once, and returns (exit code, the rest of its log)."""
+        if self.process.stderr.closed:
+            return self.process.returncode, ""
+        self.process.send_signal(how)
+        log = self.process.stderr.read()
+        self.process.stderr.close()
+        return self.process.wait(timeout=30), log
+
+
+class Result:
+    """What a run of shapectl left: exit code, both outputs, and the JSON document if stdout holds one."""
+
+    def __init__(self, process):
+        self.code = process.returncode
+        self.out, self.err = process.stdout, process.stderr
+        try:
+            self.json = json.loads(self.out)
+        except ValueError:
+            self.json = None
+
+    def message(self):
+        return self.json["error"]["message"]
+
+
+class DaemonCase(unittest.TestCase):
+    """One daemon with an empty store for all tests of a class; each test ends with the question whether it still serves."""
+
+    daemon_options = ()
+
+    @classmethod
+    def setUpClass(cls):
+        folder = tempfile.TemporaryDirectory()
+        cls.addClassCleanup(folder.cleanup)
+        cls.folder = pathlib.Path(folder.name)
+        cls.daemon = Daemon(cls.folder / "store", *cls.daemon_options)
+        cls.addClassCleanup(cls.daemon.stop)
+
+    def tearDown(self):
+        self.assertTrue(self.daemon.running(), "the daemon has died")
+        self.assertEqual(self.shapectl("models").code, SUCCESS)
+
+    @classmethod
+    def command(cls, *words):
+        return [str(BINARIES / "shapectl"), "--server", cls.daemon.address, "--output", "json", *map(str, words)]
+
+    @classmethod
+    def shapectl(cls, *words):
+        return Result(subprocess.run(cls.command(*words), capture_output=True, text=True, timeout=300))
+
+    def expect(self, code, *words):
+        result = self.shapectl(*words)
+        self.assertEqual(result.code, code, result.out + result.err)
+        return result
+
+    def refused(self, text, *words):
+        """The command is bad input, and the message contains the text."""
+        self.assertIn(text, self.expect(BAD_INPUT, *words).message())
+
+    def assertAnswer(self, document):
+        """The document carries what every answer carries."""
+        for key in ("termination", "iterations", "residual", "smallest_area_ratio", "seconds", "model"):
+            self.assertIn(key, document)
+
+
+def tube(angle=0.0, radius=0.3, rings=13, sides=8, length=3.0):
+    """A closed tube along x, bent by an angle about z: vertices and faces."""
+    x = numpy.linspace(0, length, rings)
+    around = numpy.linspace(0, 2 * numpy.pi, sides, endpoint=False)
+    bent = angle * (x / length - 0.5)
+    scale = length / angle if abs(angle) > 1e-9 else None
+    centre = (numpy.stack([scale * numpy.sin(bent), scale * (1 - numpy.cos(bent))], 1) if scale
+              else numpy.stack([x - length / 2, 0 * x], 1))
+    normal = numpy.stack([-numpy.sin(bent), numpy.cos(bent)], 1)
+    vertices = [[c[0] + radius * numpy.cos(a) * n[0], c[1] + radius * numpy.cos(a) * n[1], radius * numpy.sin(a)]
+                for c, n in zip(centre, normal) for a in around]
+    faces = []
+    for i in range(rings - 1):
+        for j in range(sides):
+            a, b = i * sides + j, i * sides + (j + 1) % sides
+            faces += [[a, b, b + sides], [a, b + sides, a + sides]]
+    for ring, flip in ((0, True), (rings - 1, False)):
+        vertices.append([*centre[ring], 0])
+        for j in range(sides):
+            a, b = ring * sides + j, ring * sides + (j + 1) % sides
+            faces.append([b, a, len(vertices) - 1] if flip else [a, b, len(vertices) - 1])
+    return numpy.array(vertices), numpy.array(faces)
+
+
+def write_mesh(path, vertices, faces):
+    """An OBJ file."""
+    with open(path, "w") as file:
+        for vertex in vertices:
+            file.write("v %r %r %r\n" % tuple(float(x) for x in vertex))
+        for face in faces:
+            file.write("f %d %d %d\n" % tuple(int(i) + 1 for i in face))
+    return path
+
+
+def read_obj(path):
+    with open(path) as file:
+        lines = [line.split() for line in file]
+    return (numpy.array([[float(x) for x in line[1:4]] for line in lines if line and line[0] == "v"]),
+            numpy.array([[int(x.split("/")[0]) - 1 for x in line[1:4]] for line in lines if line and line[0] == "f"]))
+
+
+def write_tubes(folder, count=6):
+    """Training meshes: tubes of several bends and thicknesses."""
+    paths = []
+    for i in range(count):
+        vertices, faces = tube(angle=-1.2 + 2.4 * i / (count - 1), radius=0.3 + 0.02 * ((i * i) % 5))
+        paths.append(write_mesh(folder / f"tube{i}.obj", vertices, faces))
+    return paths

@@ -1,0 +1,38 @@
+"""What any gRPC client finds: health, reflection, all services."""
+
+import unittest
+
+import grpc
+
+from support import DaemonCase
+
+
+def call(channel, method, message):
+    """A unary call with messages as bytes."""
+    return channel.unary_unary(method, lambda data: data, lambda data: data)(message, timeout=10)
+
+
+class Wire(DaemonCase):
+    def setUp(self):
+        self.channel = grpc.insecure_channel(self.daemon.address)
+        self.addCleanup(self.channel.close)
+
+    def test_health(self):
+        # HealthCheckResponse{status: SERVING}, for the daemon and for each of its services.
+        self.assertEqual(call(self.channel, "/grpc.health.v1.Health/Check", b""), b"\x08\x01")
+
+    def test_reflection_lists_the_services(self):
+        list_services = b"\x3a\x00"
+        method = self.channel.stream_stream("/grpc.reflection.v1alpha.ServerReflection/ServerReflectionInfo",
+                                            lambda data: data, lambda data: data)
+        answer = next(method(iter([list_services]), timeout=10))
+        for service in ("Models", "Datasets", "Jobs", "Shapes"):
+            self.assertIn(b"shaped.v1." + service.encode(), answer)
+
+    def test_garbage_is_refused(self):
+        with self.assertRaises(grpc.RpcError):
+            call(self.channel, "/shaped.v1.Jobs/Get", b"\xff\xff\xff")
+
+
+if __name__ == "__main__":
+    unittest.main()
