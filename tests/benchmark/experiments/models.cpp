@@ -16,10 +16,11 @@ ModelDirectory cache() {
 
 }  // namespace
 
-Solved<ShellPgaModelPtr> train(const DataSet& set, int modes) {
+Solved<ShellPgaModelPtr> train(const DataSet& set, int modes, std::optional<double> bending) {
   ShellPgaTrainingOptions options;
   options.modes = modes;
   options.path_steps = 4;
+  options.bending = bending;
   options.coarse_vertices = 1000;
   return trainShellPga({set.topology, set.shapes, {}}, options, {}, {});
 }

@@ -5,8 +5,8 @@
 
 namespace shaped::experiments {
 
-/// Trains with K = 4, 1000 coarse vertices and the default bending weight.
-Solved<ShellPgaModelPtr> train(const DataSet& set, int modes);
+/// Trains with K = 4, 1000 coarse vertices and, where none is given, the default bending weight.
+Solved<ShellPgaModelPtr> train(const DataSet& set, int modes, std::optional<double> bending = {});
 
 /// Keeps a trained model for later rows; the newest of a name counts.
 void keep(const std::string& model_name, const ShellPgaModel& model);

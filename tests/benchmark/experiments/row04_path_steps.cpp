@@ -1,5 +1,6 @@
 #include <cmath>
 
+#include "core/shell/energy.h"
 #include "core/statistics/gram.h"
 #include "tests/benchmark/experiments/data.h"
 #include "tests/benchmark/experiments/experiment.h"
@@ -11,9 +12,28 @@ namespace {
 constexpr int kSteps[] = {2, 4, 8, 16};
 
 struct Observation {
-  Eigen::MatrixXd gram;
+  Eigen::MatrixXd gram;         ///< (11)
+  Eigen::MatrixXd symmetrised;  ///< (11) with W[mean, s_1] averaged over its directions, as W[s_1^i, s_1^j] is
   Eigen::VectorXd eigenvalues;  ///< n - 1, without the one that is zero
 };
+
+/// W[a, b] = d^2 + c d^3 + ..: the cubic term changes sign with the direction, so it is of first order in 1 / K in (11)
+/// wherever only one direction is taken.
+Eigen::MatrixXd symmetrised(const GeodesicCalculus& calculus, const Spider& spider, Eigen::MatrixXd gram) {
+  const auto n = gram.rows();
+  const auto steps = static_cast<double>(spider.arms.front().size() - 1);
+  Eigen::VectorXd change(n);
+  for (Eigen::Index i = 0; i < n; ++i) {
+    const auto& node = spider.arms[static_cast<std::size_t>(i)][1];
+    const auto& topology = calculus.topology();
+    change[i] = 0.5 * (shellEnergy(topology, node, spider.mean, calculus.bending()) -
+                       shellEnergy(topology, spider.mean, node, calculus.bending()));
+  }
+  const double factor = steps * steps / (2 * static_cast<double>(n));
+  gram.colwise() += factor * change;
+  gram.rowwise() += factor * change.transpose();
+  return gram;
+}
 
 Observation observe(const GeodesicCalculus& calculus, const std::vector<Vertices>& shapes, int steps,
                     Outcome& outcome) {
@@ -22,7 +42,7 @@ Observation observe(const GeodesicCalculus& calculus, const std::vector<Vertices
   const auto spider = frechetMean(calculus, shapes, options);
   outcome += spider;
   const auto gram = gramMatrix(calculus, spider.solution);
-  return {gram, spectrum(gram).values.head(gram.rows() - 1)};
+  return {gram, symmetrised(calculus, spider.solution, gram), spectrum(gram).values.head(gram.rows() - 1)};
 }
 
 /// Slope of the least-squares line through log(error) over log(1 / K).
@@ -61,11 +81,12 @@ void reportErrors(Report& report, const std::string& what, const std::vector<Eig
 void convergenceInSteps(Report& report, const DataSet& set) {
   const auto calculus = calculusOf(set);
   Outcome outcome;
-  std::vector<Eigen::MatrixXd> grams, eigenvalues;
+  std::vector<Eigen::MatrixXd> grams, symmetrised_grams, eigenvalues;
   const Stopwatch watch;
   for (const int steps : kSteps) {
     auto observation = observe(calculus, set.shapes, steps, outcome);
     grams.push_back(std::move(observation.gram));
+    symmetrised_grams.push_back(std::move(observation.symmetrised));
     eigenvalues.push_back(observation.eigenvalues);
   }
   const std::string which = text("%zu shapes of %s on %ld vertices", set.shapes.size(), set.name.c_str(),
@@ -76,6 +97,7 @@ void convergenceInSteps(Report& report, const DataSet& set) {
                "converged", outcome.converged());
   reportErrors(report, which + ", Gram entries", grams);
   reportErrors(report, which + ", eigenvalues", eigenvalues);
+  reportErrors(report, which + ", Gram entries with both directions of W[mean, s_1]", symmetrised_grams);
 }
 
 }  // namespace
