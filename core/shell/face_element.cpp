@@ -3,6 +3,8 @@
 #include <Eigen/Eigenvalues>
 #include <cmath>
 
+#include "core/shell/block_updates.h"
+
 namespace shaped {
 namespace {
 
@@ -53,8 +55,10 @@ FaceElement lengthElement(const FaceGeometry& face, const FaceCurvature& curvatu
     // k + 1 ends edges k (-) and k + 2 (+)
     const Eigen::Vector3d by_this = 4 * (form[k][last] * e[last] - form[k][k] * e[k]);
     const Eigen::Vector3d by_next = 4 * (form[next][k] * e[k] - form[next][last] * e[last]);
-    element.between[k] = e[k] * by_this.transpose() + e[next] * by_next.transpose();
-    element.between[k].diagonal().array() -= 2 * curvature.weight[k];
+    auto& block = element.between[k];
+    block = Eigen::Vector3d::Constant(-2 * curvature.weight[k]).asDiagonal();
+    addOuter(e[k], by_this, block.data());
+    addOuter(e[next], by_next, block.data());
   }
   return element;
 }
@@ -75,7 +79,8 @@ void addFoldElement(const FaceGeometry& face, const std::array<double, 3>& w, Fa
     const std::size_t i = (k + 2) % 3, j = (k + 1) % 3;
     const Eigen::Vector3d along = (u[k] / (2 * l[k])) * M[k];
     const Eigen::Vector3d p = -c[j] * M[i] - along, q = -c[i] * M[j] - along;
-    element.between[k] += n * p.transpose() + q * n.transpose();
+    addOuter(n, p, element.between[k].data());
+    addOuter(q, n, element.between[k].data());
   }
 }
 

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 
+#include "core/shell/block_updates.h"
 #include "core/shell/face_element.h"
 #include "core/shell/hinge_geometry.h"
 
@@ -93,7 +94,7 @@ void addDeformedHinge(const std::array<LowerSlot, 10>& slots, const HingeGeometr
   const auto angle = geometry.angleGradient();
   for (const auto& slot : slots) {
     const Eigen::Vector3d column = angle_angle * angle[slot.column];
-    Eigen::Map<Eigen::Matrix3d>(hessian.block(slot.slot)) += angle[slot.row] * column.transpose();
+    addOuter(angle[slot.row], column, hessian.block(slot.slot));
   }
 }
 
@@ -107,10 +108,12 @@ void addUndeformedHinge(const std::array<LowerSlot, 10>& slots, const HingeGeome
     by_length[j] = c.angle_length * angle[j] + c.length_length * length[j] + c.length_area * area[j];
     by_area[j] = c.angle_area * angle[j] + c.length_area * length[j] + c.area_area * area[j];
   }
-  for (const auto& slot : slots)
-    Eigen::Map<Eigen::Matrix3d>(hessian.block(slot.slot)) += angle[slot.row] * by_angle[slot.column].transpose() +
-                                                             length[slot.row] * by_length[slot.column].transpose() +
-                                                             area[slot.row] * by_area[slot.column].transpose();
+  for (const auto& slot : slots) {
+    double* block = hessian.block(slot.slot);
+    addOuter(angle[slot.row], by_angle[slot.column], block);
+    addOuter(length[slot.row], by_length[slot.column], block);
+    addOuter(area[slot.row], by_area[slot.column], block);
+  }
   constexpr std::array<std::size_t, 3> edge_blocks{0, 1, 4};  // (0,0) (1,1) (1,0)
   for (const auto p : edge_blocks)
     Eigen::Map<Eigen::Matrix3d>(hessian.block(slots[p].slot)).diagonal().array() += (p < 2 ? 2 : -2) * c.length;

@@ -1,5 +1,4 @@
-#include <Eigen/Core>
-
+#include "core/shell/block_updates.h"
 #include "core/shell/energy.h"
 #include "core/shell/face_geometry.h"
 #include "core/shell/hinge_geometry.h"
@@ -7,8 +6,6 @@
 
 namespace shaped {
 namespace {
-
-using Block = Eigen::Map<Eigen::Matrix3d>;
 
 /// One pair of shapes and the weights of its energy.
 struct Pair {
@@ -36,7 +33,9 @@ void addFace(const Pair& pair, std::size_t f, const std::array<std::int32_t, 9>&
     for (std::size_t k = 0; k < 3; ++k) y[k] = form[k][next] * E[next] - form[k][last] * E[last];
     for (std::size_t row = 0; row < 3; ++row) {
       const std::size_t a = (row + 1) % 3, b = (row + 2) % 3;
-      Block(matrix.block(slots[3 * row + column])) += e[a] * y[a].transpose() - e[b] * y[b].transpose();
+      double* block = matrix.block(slots[3 * row + column]);
+      addOuter(e[a], y[a], block);
+      addOuter(e[b], -y[b], block);
     }
   }
 }
@@ -55,7 +54,7 @@ void addHinge(const Pair& pair, std::size_t h, const std::array<std::int32_t, 16
   const double by_angle = scale * l, by_length = scale * d, by_area = -by_angle * d * inverse_area;
   for (std::size_t r = 0; r < 4; ++r) {
     const Eigen::Vector3d row = by_angle * angle[r] + by_length * length[r] + by_area * area[r];
-    for (std::size_t c = 0; c < 4; ++c) Block(matrix.block(slots[4 * r + c])) += row * deformed[c].transpose();
+    for (std::size_t c = 0; c < 4; ++c) addOuter(row, deformed[c], matrix.block(slots[4 * r + c]));
   }
 }
 
