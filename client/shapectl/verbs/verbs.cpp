@@ -9,6 +9,7 @@ std::vector<Verb> allVerbs() {
       jobsVerb(),    watchVerb(),      cancelVerb(),                   //
       projectVerb(), synthesizeVerb(), interpolateVerb(), editVerb(),  //
       fitVerb(),     scoreVerb(),      evaluateVerb(),                 //
+      sampleVerb(),  renderVerb(),                                     //
   };
 }
 

@@ -20,6 +20,8 @@ Verb editVerb();
 Verb fitVerb();
 Verb scoreVerb();
 Verb evaluateVerb();
+Verb sampleVerb();
+Verb renderVerb();
 
 /// Every verb, in the order of the help.
 std::vector<Verb> allVerbs();
