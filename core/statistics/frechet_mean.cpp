@@ -43,7 +43,8 @@ class ProgressCounter {
   void advance(double residual) {
     const std::lock_guard lock(mutex_);
     ++done_;
-    if (sink_) sink_({stage_, from_ + (to_ - from_) * static_cast<double>(done_) / static_cast<double>(total_), residual});
+    if (sink_)
+      sink_({stage_, from_ + (to_ - from_) * static_cast<double>(done_) / static_cast<double>(total_), residual});
   }
 
  private:
@@ -84,7 +85,8 @@ std::vector<Path> splitArms(ElasticNetwork network, std::size_t count, int steps
 }
 
 /// The elastic average with a rough geodesic to each input.
-Spider startSpider(const GeodesicCalculus& calculus, const std::vector<Vertices>& shapes, const FrechetMeanOptions& options) {
+Spider startSpider(const GeodesicCalculus& calculus, const std::vector<Vertices>& shapes,
+                   const FrechetMeanOptions& options) {
   Spider spider;
   spider.mean = elasticAverage(calculus, shapes, options).solution;
   spider.arms.resize(shapes.size());
@@ -99,6 +101,16 @@ Spider startSpider(const GeodesicCalculus& calculus, const std::vector<Vertices>
   return spider;
 }
 
+void requireFittingStart(const Spider& start, std::size_t shapes, int steps) {
+  if (start.arms.size() != shapes)
+    throw InvalidInput("start", "has " + std::to_string(start.arms.size()) + " arms, want one for each of the " +
+                                    std::to_string(shapes) + " shapes");
+  for (std::size_t i = 0; i < shapes; ++i)
+    if (start.arms[i].size() != static_cast<std::size_t>(steps) + 1)
+      throw InvalidInput("start.arms[" + std::to_string(i) + "]",
+                         "has " + std::to_string(start.arms[i].size()) + " shapes, want " + std::to_string(steps + 1));
+}
+
 }  // namespace
 
 Solved<Spider> frechetMean(const GeodesicCalculus& calculus, const std::vector<Vertices>& shapes,
@@ -109,6 +121,7 @@ Solved<Spider> frechetMean(const GeodesicCalculus& calculus, const std::vector<V
     requireValidShape(calculus.topology(), shapes[i], "shapes[" + std::to_string(i) + "]");
 
   const int steps = options.path_steps;
+  if (options.start) requireFittingStart(*options.start, shapes.size(), steps);
   Spider start = options.start ? *options.start : startSpider(calculus, shapes, options);
   for (std::size_t i = 0; i < shapes.size(); ++i) start.arms[i].back() = shapes[i];
   if (options.stop.stop_requested()) return {std::move(start), Outcome{Termination::kCancelled, 0, 1}};
@@ -118,8 +131,8 @@ Solved<Spider> frechetMean(const GeodesicCalculus& calculus, const std::vector<V
       const double fraction = 1 - 0.7 * std::pow(0.85, iteration);
       options.progress({"Frechet mean, Newton step " + std::to_string(iteration), fraction, residual});
     };
-  auto relaxed = relax(calculus.structure(), calculus.bending(),
-                       buildSpider(start.mean, std::move(start.arms), steps), network_options);
+  auto relaxed = relax(calculus.structure(), calculus.bending(), buildSpider(start.mean, std::move(start.arms), steps),
+                       network_options);
   Spider spider;
   spider.mean = relaxed.solution.nodes.front();
   spider.arms = splitArms(std::move(relaxed.solution), shapes.size(), steps);
