@@ -131,7 +131,11 @@ Solved<SubmanifoldPoint> Submanifold::optimiseWeights(const ShellMeasures& targe
                                                       const SubmanifoldOptions& options, Vertices& q,
                                                       double& energy) const {
   const auto& topology = calculus_->topology();
-  const double size = shellEnergy(topology, measure(topology, pga_->mean), target, calculus_->bending());
+  // what (17) makes of W[mean, s_loc], and never less: near the mean the polyhedron's size is the measure
+  const double reach = options.kappa * nearestVariation(vertices.size() / 2);
+  const double size =
+      std::max(reach * reach, shellEnergy(topology, measure(topology, pga_->mean), target, calculus_->bending()));
+  const double noise = 3e-16 * target.area.sum();
   const auto spread = [&](const Eigen::VectorXd& used) {
     Eigen::VectorXd all = Eigen::VectorXd::Zero(forces_.size());
     for (std::size_t j = 0; j < vertices.size(); ++j)
@@ -145,11 +149,14 @@ Solved<SubmanifoldPoint> Submanifold::optimiseWeights(const ShellMeasures& targe
   auto solved = average(spread(alpha), q, options);
   q = std::move(solved.solution);
   energy = evaluate(q);
+  Outcome shape_outcome = solved;  // of the solve that q comes from
   for (outcome.iterations = 0;; ++outcome.iterations) {
     const LocalProjection model(*this, target, vertices, alpha, q);
     const Eigen::VectorXd step = model.step(alpha);
     const double slope = model.gradient.dot(step);
-    outcome.residual = std::sqrt(std::max(-slope, 0.0) / std::max(size, 1e-300));
+    outcome.residual = std::sqrt(std::max(-slope, 0.0) / size);
+    outcome.termination = Termination::kNumericalFailure;
+    if (!std::isfinite(slope)) break;
     outcome.termination = Termination::kConverged;
     if (outcome.residual <= options.tolerance) break;
     outcome.termination = Termination::kIterationLimit;
@@ -160,16 +167,18 @@ Solved<SubmanifoldPoint> Submanifold::optimiseWeights(const ShellMeasures& targe
     for (; length > 1e-4; length *= 0.5) {
       auto trial = average(spread(alpha + length * step), q + unflatten(length * (model.response * step)), options);
       const double trial_energy = evaluate(trial.solution);
-      if (!(trial_energy <= energy + 1e-4 * length * slope)) continue;
+      if (!(trial_energy <= energy + 1e-4 * length * slope + noise)) continue;
       alpha = (alpha + length * step).cwiseMax(0);
       alpha /= alpha.sum();
       q = std::move(trial.solution);
       energy = trial_energy;
+      shape_outcome = trial;
       break;
     }
     outcome.termination = Termination::kStalled;
     if (length <= 1e-4) break;
   }
+  if (!shape_outcome.converged()) outcome += shape_outcome;
   return {SubmanifoldPoint{spread(alpha), 1}, outcome};
 }
 
@@ -182,7 +191,7 @@ Solved<SubmanifoldProjection> Submanifold::project(const Vertices& shape, const 
   Outcome outcome = path;
   SubmanifoldProjection result;
   const double distance = calculus_->distance(path.solution);
-  const double nearest = distances_.head(static_cast<Eigen::Index>(vertices.size() / 2)).minCoeff();
+  const double nearest = nearestVariation(vertices.size() / 2);
   const double longest = 1.0 / pga_->path_steps;  // s_loc stays on the first segment
   result.point.scale = distance > 0 ? std::min(longest, options.kappa * nearest / distance) : longest;
   const auto local = calculus_->at(path.solution, result.point.scale, geodesic_options);
@@ -191,6 +200,7 @@ Solved<SubmanifoldProjection> Submanifold::project(const Vertices& shape, const 
   Eigen::VectorXd start(static_cast<Eigen::Index>(vertices.size()));
   for (std::size_t j = 0; j < vertices.size(); ++j)
     start[static_cast<Eigen::Index>(j)] = warm ? warm->point.alpha[static_cast<Eigen::Index>(vertices[j])] : 1.0;
+  if (!(start.sum() > 0)) start.setOnes();  // warm, but with other modes
   start /= start.sum();
   result.local = warm ? warm->local : pga_->mean;
   const auto weights = optimiseWeights(measure(calculus_->topology(), local.solution), vertices, start, options,
@@ -206,10 +216,23 @@ Solved<SubmanifoldProjection> Submanifold::project(const Vertices& shape, const 
 
 Solved<Vertices> Submanifold::rescale(const Vertices& local, double scale, const Vertices& first_node,
                                       const SubmanifoldOptions& options) const {
-  // The exact inverse of the scaling: local lies at rho K on the first segment of a K-geodesic from the mean, whose
+  // Far from the mean (23) may have no solution for steps as long as a K-th of the way; then shorter ones.
+  int spent = 0;
+  for (int steps = pga_->path_steps;; steps *= 2) {
+    auto marched = march(local, scale, steps, steps == pga_->path_steps ? first_node : Vertices(), options);
+    spent += marched.iterations;
+    if (marched.converged() || marched.termination == Termination::kCancelled || scale * steps > 1) {
+      marched.iterations = spent;
+      return marched;
+    }
+  }
+}
+
+Solved<Vertices> Submanifold::march(const Vertices& local, double scale, int steps, const Vertices& first_node,
+                                    const SubmanifoldOptions& options) const {
+  // The exact inverse of the scaling: local lies at rho times the steps on the first segment of a geodesic from the mean, whose
   // first node follows from (24) and the others by (23). So a shape whose local one is on the submanifold comes back.
   const auto geodesic_options = geodesicOptions(options);
-  const int steps = pga_->path_steps;
   if (scale * steps > 1) return calculus_->at({pga_->mean, local}, 1 / scale, geodesic_options);
   auto first = calculus_->through(pga_->mean, local, scale * steps, geodesic_options, first_node);
   Outcome outcome = first;

@@ -13,17 +13,17 @@ struct SubmanifoldPoint {
 /// Projection of one shape, with what a similar shape's projection can start from.
 struct SubmanifoldProjection {
   SubmanifoldPoint point;
-  Vertices shape;         ///< P[s] (20), in no particular position
-  Vertices local;         ///< P_loc[s_loc] (18)
-  Path geodesic;          ///< from the mean to s
-  double local_energy;    ///< W[s_loc, P_loc[s_loc]] [m^2]
+  Vertices shape;       ///< P[s] (20), in no particular position
+  Vertices local;       ///< P_loc[s_loc] (18)
+  Path geodesic;        ///< from the mean to s
+  double local_energy;  ///< W[s_loc, P_loc[s_loc]] [m^2]
 };
 
 struct SubmanifoldOptions {
-  int modes = 0;             ///< J to use, 1 .. model's; 0 = all
-  double kappa = 0.5;        ///< of (17), in (0, 1)
-  int max_iterations = 50;   ///< of the weights' optimisation, >= 1
-  double tolerance = 1e-6;   ///< of the weights: norm of the projected gradient over that of the forces, > 0
+  int modes = 0;                  ///< J to use, 1 .. model's; 0 = all
+  double kappa = 0.5;             ///< of (17), in (0, 1)
+  int max_iterations = 50;        ///< of the weights' optimisation, >= 1
+  double tolerance = 1e-6;        ///< of the weights: sqrt(gain that a step promises / W[mean, s_loc]), > 0
   double shape_tolerance = 1e-8;  ///< of every inner shape solve, > 0
   std::stop_token stop;
 };
@@ -37,7 +37,8 @@ class Submanifold {
   const GeodesicCalculus& calculus() const { return *calculus_; }
 
   /// q(alpha), the minimiser of (26), started from `start`.
-  Solved<Vertices> average(const Eigen::VectorXd& alpha, const Vertices& start, const SubmanifoldOptions& options) const;
+  Solved<Vertices> average(const Eigen::VectorXd& alpha, const Vertices& start,
+                           const SubmanifoldOptions& options) const;
 
   /// (17)-(20): scaling, local projection, rescaling. warm: the projection of a similar shape, or null.
   Solved<SubmanifoldProjection> project(const Vertices& shape, const SubmanifoldOptions& options,
@@ -56,12 +57,19 @@ class Submanifold {
  private:
   struct LocalProjection;
   std::vector<std::size_t> vertexIndices(int modes) const;
+  /// min_j dist(mean, p_j) over the first `modes` variations [m].
+  double nearestVariation(std::size_t modes) const {
+    return distances_.head(static_cast<Eigen::Index>(modes)).minCoeff();
+  }
   Solved<SubmanifoldPoint> optimiseWeights(const ShellMeasures& target, const std::vector<std::size_t>& vertices,
                                            Eigen::VectorXd start, const SubmanifoldOptions& options, Vertices& q,
                                            double& energy) const;
-  /// I(mean, local, 1 / scale). first_node: a guess of the first node 1/K along the way, or empty.
+  /// I(mean, local, 1 / scale) in K steps, or more where K do not get there. first_node: a guess of the first node 1/K
+  /// along the way, or empty.
   Solved<Vertices> rescale(const Vertices& local, double scale, const Vertices& first_node,
                            const SubmanifoldOptions& options) const;
+  Solved<Vertices> march(const Vertices& local, double scale, int steps, const Vertices& first_node,
+                         const SubmanifoldOptions& options) const;
 
   std::shared_ptr<const GeodesicCalculus> calculus_;
   std::shared_ptr<const ShellPga> pga_;
