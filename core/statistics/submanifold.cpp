@@ -230,8 +230,9 @@ Solved<Vertices> Submanifold::rescale(const Vertices& local, double scale, const
 
 Solved<Vertices> Submanifold::march(const Vertices& local, double scale, int steps, const Vertices& first_node,
                                     const SubmanifoldOptions& options) const {
-  // The exact inverse of the scaling: local lies at rho times the steps on the first segment of a geodesic from the mean, whose
-  // first node follows from (24) and the others by (23). So a shape whose local one is on the submanifold comes back.
+  // The exact inverse of the scaling: local lies at rho times the steps on the first segment of a geodesic from the
+  // mean, whose first node follows from (24) and the others by (23). So a shape whose local one is on the submanifold
+  // comes back.
   const auto geodesic_options = geodesicOptions(options);
   if (scale * steps > 1) return calculus_->at({pga_->mean, local}, 1 / scale, geodesic_options);
   auto first = calculus_->through(pga_->mean, local, scale * steps, geodesic_options, first_node);

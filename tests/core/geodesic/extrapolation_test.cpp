@@ -102,6 +102,20 @@ TEST_CASE("between nodes I(a, b, t) minimises (24) and runs continuously through
     }
 }
 
+TEST_CASE("through() undoes between(): the far end follows from the near one and a shape on the way") {
+  const Setting s;
+  for (const double t : {0.02, 0.1, 0.5, 0.9, 1.0}) {
+    INFO("t = " << t);
+    const auto inner = s.calculus.between(s.a, s.b, t, {});
+    REQUIRE(inner.converged());
+    for (const auto& guess : {Vertices(), s.b}) {
+      const auto far = s.calculus.through(s.a, inner.solution, t, {}, guess);
+      REQUIRE(far.converged());
+      CHECK(rigidGap(far.solution, s.b) < 1e-6 * s.size / t);
+    }
+  }
+}
+
 TEST_CASE("I(a, b, t) bends a tube by t times the angle, between and beyond the ends") {
   const auto pipe = tube(13, 8);
   const auto calculus = calculusOn(pipe);

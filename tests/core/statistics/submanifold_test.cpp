@@ -117,19 +117,17 @@ TEST_CASE("shapes of the submanifold are projected to themselves, the better the
   for (std::size_t k = 1; k < worst.size(); ++k) CHECK(order(worst[k - 1], worst[k]) > 0.8);
 }
 
-TEST_CASE("projecting twice changes little more: P[P[s]] tends to P[s] as K grows") {
-  std::vector<double> worst;
-  for (const int steps : {2, 4, 8}) {
-    const Model model(steps, 3);
-    double error = 0;
-    for (const auto& shape : model.set.shapes) {
-      const auto once = model.project(shape);
-      error = std::max(error, model.relativeGap(model.project(once.shape).shape, once.shape));
+TEST_CASE("projecting twice changes nothing more: P[P[s]] = P[s]") {
+  for (const int modes : {3, 4})
+    for (const int steps : {2, 4}) {
+      const Model model(steps, modes);
+      for (const auto& shape : model.set.shapes) {
+        const auto once = model.project(shape);
+        INFO("J = " << modes << ", K = " << steps);
+        // with fewer modes P[s] is nearer than s, its scale another, and C_J not quite a cone
+        CHECK(model.relativeGap(model.project(once.shape).shape, once.shape) < (modes == 4 ? 2e-5 : 2e-3));
+      }
     }
-    worst.push_back(error);
-  }
-  CHECK(worst[0] < 0.04);
-  for (std::size_t k = 1; k < worst.size(); ++k) CHECK(order(worst[k - 1], worst[k]) > 0.6);
 }
 
 TEST_CASE("with all n - 1 modes the training shapes are reproduced, to an error that falls with K") {
@@ -175,7 +173,7 @@ TEST_CASE("tangent coordinates of the training shapes are centred with the eigen
   CHECK(order(centres[0], centres[2]) > 1.6);
 }
 
-TEST_CASE("shapeOf undoes the weights of a projection, and doubling agrees with plain repeated extrapolation") {
+TEST_CASE("shapeOf returns the projection of its point, and agrees with plain repeated extrapolation") {
   const Model model(4, 4);
   for (const auto& shape : model.set.shapes) {
     const auto projection = model.project(shape);
@@ -188,7 +186,7 @@ TEST_CASE("shapeOf undoes the weights of a projection, and doubling agrees with 
     const auto plain = model.set.calculus->at({model.pga->mean, q}, factor, {});
     REQUIRE(plain.converged());
     INFO("factor " << factor);
-    CHECK(rigidGap(shape, plain.solution) < 0.02 * rigidGap(shape, model.pga->mean));
+    CHECK(rigidGap(shape, plain.solution) < 0.03 * rigidGap(shape, model.pga->mean));
     CHECK(rigidGap(shape, model.pga->mean) == Approx(factor * rigidGap(q, model.pga->mean)).epsilon(0.15));
   }
 }
@@ -205,6 +203,23 @@ TEST_CASE("points far beyond the training shapes are still reached, in as many s
   CHECK(rigidGap(shape, plain.solution) < 0.05 * rigidGap(shape, model.pga->mean));
 }
 
+TEST_CASE("pointOf inverts the tangent coordinates with weights on the simplex") {
+  const Model model(2, 4);
+  for (const double size : {0.0, 1e-3, 0.5, 2.0}) {
+    const Eigen::VectorXd y = size * (Eigen::VectorXd(4) << 0.5, -0.2, 0, 0.03).finished();
+    const auto point = model.manifold->pointOf(y);
+    CHECK(point.alpha.minCoeff() >= 0);
+    CHECK(point.alpha.sum() == Approx(1).epsilon(1e-14));
+    CHECK(point.scale > 0);
+    CHECK((model.manifold->tangentCoordinates(point) - y).norm() < 1e-14);
+  }
+  CHECK(rigidGap(model.shapeOf(model.manifold->pointOf(Eigen::VectorXd::Zero(4))), model.pga->mean) < 3e-3);
+  // through the shape and back: the coordinates of a synthesised shape are those it was made of
+  const Eigen::VectorXd y = (Eigen::VectorXd(4) << 0.6, -0.3, 0.2, 0.05).finished();
+  const auto projection = model.project(model.shapeOf(model.manifold->pointOf(y)));
+  CHECK((model.manifold->tangentCoordinates(projection.point) - y).norm() < 0.05 * y.norm());
+}
+
 TEST_CASE("every vertex of the polyhedron is its own projection") {
   const Model model(4, 4);
   for (Eigen::Index j = 0; j < 8; ++j) {
@@ -213,7 +228,7 @@ TEST_CASE("every vertex of the polyhedron is its own projection") {
     CHECK(rigidGap(model.shapeOf(corner), variation) < 1e-9);
     const auto projection = model.project(variation);
     INFO("variation " << j);
-    CHECK(model.relativeGap(projection.shape, variation) < 0.01);
+    CHECK(model.relativeGap(projection.shape, variation) < 0.03);
     const auto y = model.manifold->tangentCoordinates(projection.point);
     Eigen::Index largest;
     y.cwiseAbs().maxCoeff(&largest);
