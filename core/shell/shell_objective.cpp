@@ -35,7 +35,6 @@ double ShellObjective::value(const Eigen::VectorXd& x) {
 double ShellObjective::gradient(const Eigen::VectorXd& x, Eigen::VectorXd& gradient) {
   update(x);
   const auto& topology = structure_->topology();
-  if (!reference_norm_) reference_norm_ = measureReferenceNorm();
   MeasureGradient measures(topology);
   average_.addGradient(topology, measures_, 1, measures);
   for (const auto& term : deformed_)
@@ -43,6 +42,10 @@ double ShellObjective::gradient(const Eigen::VectorXd& x, Eigen::VectorXd& gradi
   Vertices result = Vertices::Zero(shape_.rows(), 3);
   pullBackGradient(topology, shape_, measures, result);
   gradient = flatten(result);
+  if (!reference_norm_)
+    reference_norm_ = measureReferenceNorm();
+  else if (!reference_given_ && gradient.norm() < 1e-6 * *reference_norm_)
+    reference_norm_ = std::min(*reference_norm_, measureReferenceNorm());
   return *reference_norm_;
 }
 
@@ -105,7 +108,7 @@ double forceFloor(const Topology& topology, const Vertices& shape, const ShellMe
     const double noise = bending * reach * squared / (one + two) * squared / 4 * (1 / (one * one) + 1 / (two * two));
     sum += noise * noise;
   }
-  return 1e8 * rounding * std::sqrt(sum);
+  return std::min(1e8 * rounding * std::sqrt(sum), 1e-2 * std::sqrt(measures.area.sum()));
 }
 
 }  // namespace shaped

@@ -12,8 +12,8 @@ namespace shaped {
 ///   E(x) = sum_j w_j W[s_j, x] + sum_k v_k W[x, t_k],
 /// for Newton's method. Rigid motions are removed by pinning six unknowns, or by the pins given.
 ///
-/// The residual's reference norm is the sum over the terms of the norm of each one's force at the first iterate: the
-/// size of the forces that balance at the minimum.
+/// The residual's reference norm is the sum over the terms of the norm of each one's force, the size of the forces that
+/// balance at the minimum: measured at the first iterate, and again near the minimum in case the start was far off.
 class ShellObjective : public NewtonObjective {
  public:
   ShellObjective(ShellStructurePtr structure, double bending);
@@ -25,7 +25,10 @@ class ShellObjective : public NewtonObjective {
   /// Holds these unknowns instead of the gauge's; they must determine the rigid motion.
   void setPins(Pins pins) { fixed_pins_ = std::move(pins); }
   /// A reference norm known beforehand, which spares its evaluation.
-  void setReferenceNorm(double norm) { reference_norm_ = norm; }
+  void setReferenceNorm(double norm) {
+    reference_norm_ = norm;
+    reference_given_ = true;
+  }
 
   double value(const Eigen::VectorXd& x) override;
   double noise() const override { return noise_; }
@@ -47,6 +50,7 @@ class ShellObjective : public NewtonObjective {
   std::vector<Term> undeformed_, deformed_;
   std::optional<Pins> fixed_pins_;
   std::optional<double> reference_norm_;
+  bool reference_given_ = false;
   double noise_ = 0;
   Vertices shape_;
   ShellMeasures measures_;
@@ -65,6 +69,7 @@ Solved<Vertices> minimiseShell(ShellObjective& objective, const ShellStructure& 
 /// Reference forces are never taken smaller than this, so that equal shapes, whose forces are rounding alone, count as
 /// balanced: 1e8 times the force that rounding leaves at equilibrium [m]. Positions carry 16 digits of their distance
 /// from the origin, stiff thin triangles turn the rest into forces, and their areas lose digits.
+/// At most the force of a strain of 1e-2, so that one nearly collapsed triangle does not hide the others' imbalance.
 double forceFloor(const Topology& topology, const Vertices& shape, const ShellMeasures& measures, double bending);
 
 }  // namespace shaped
