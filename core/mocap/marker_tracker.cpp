@@ -116,12 +116,11 @@ Outcome MarkerTracker::projectShape() {
   return projected;
 }
 
-Outcome MarkerTracker::firstFrame() {
-  for (std::size_t l = 0; l < targets_.size(); ++l) targets_[l].position = markers_.row(static_cast<Eigen::Index>(l));
-  if (!determinePlacement(targets_))
-    throw InvalidInput("markers", "the first frame shows fewer than three markers, or only markers on one line");
+/// From the mean, placed by the markers: rounds of shape and projection until W[s, P[s]] settles.
+Outcome MarkerTracker::alternate(bool estimate_scale) {
   shape_ = prior_ = submanifold_->pga().mean;
-  updateScale();
+  projection_ = {};
+  if (estimate_scale) updateScale();
   followRigidly();
   Outcome outcome;
   double last_energy = std::numeric_limits<double>::infinity();
@@ -131,14 +130,21 @@ Outcome MarkerTracker::firstFrame() {
     if (outcome.termination == Termination::kCancelled) return outcome;
     outcome += projectShape();
     if (!outcome.converged()) return outcome;
-    updateScale();
+    if (estimate_scale) updateScale();
     updateWeights();
     const double energy = shellEnergy(calculus.topology(), shape_, prior_, calculus.bending());
     if (round > 2 && energy > 0.98 * last_energy) break;
     last_energy = energy;
   }
-  outcome += fitShape();
-  started_ = true;
+  return outcome += fitShape();
+}
+
+Outcome MarkerTracker::firstFrame() {
+  for (std::size_t l = 0; l < targets_.size(); ++l) targets_[l].position = markers_.row(static_cast<Eigen::Index>(l));
+  if (!determinePlacement(targets_))
+    throw InvalidInput("markers", "the first frame shows fewer than three markers, or only markers on one line");
+  const Outcome outcome = alternate(true);
+  started_ = outcome.converged();
   return outcome;
 }
 
@@ -151,7 +157,12 @@ Outcome MarkerTracker::nextFrame() {
     updateWeights();
     outcome += fitShape();
   }
-  return outcome;
+  if (outcome.converged() || outcome.termination == Termination::kCancelled) return outcome;
+  // the last frame led nowhere: this one starts anew
+  for (auto& target : targets_) target.weight = seen(target) ? 1.0 : 0.0;
+  Outcome anew = alternate(false);
+  anew.iterations += outcome.iterations;
+  return anew;
 }
 
 Solved<MarkerFit> MarkerTracker::fit(const MarkerPositions& markers) {

@@ -70,6 +70,7 @@ class MarkerTracker {
   void updateScale();
   Outcome fitShape();
   Outcome projectShape();
+  Outcome alternate(bool estimate_scale);
   Outcome firstFrame();
   Outcome nextFrame();
   MarkerFit report() const;
