@@ -1,8 +1,11 @@
 #include "core/mesh/quality.h"
 
 #include <Eigen/Geometry>
+#include <algorithm>
 #include <cmath>
+#include <numeric>
 #include <string>
+#include <vector>
 
 #include "core/numerics/error.h"
 
@@ -71,6 +74,21 @@ Vertices vertexNormals(const Faces& faces, const Vertices& vertices) {
 double boundingBoxDiagonal(const Vertices& vertices) {
   if (vertices.rows() == 0) return 0;
   return (vertices.colwise().maxCoeff() - vertices.colwise().minCoeff()).norm();
+}
+
+double diameter(const Vertices& vertices) {
+  if (vertices.rows() == 0) return 0;
+  // two vertices are no farther apart than the sum of their distances from the centre: few pairs are left to measure
+  const Eigen::RowVector3d centre = vertices.colwise().mean();
+  const Eigen::VectorXd reach = (vertices.rowwise() - centre).rowwise().norm();
+  std::vector<Eigen::Index> order(static_cast<std::size_t>(vertices.rows()));
+  std::iota(order.begin(), order.end(), Eigen::Index{0});
+  std::sort(order.begin(), order.end(), [&](Eigen::Index a, Eigen::Index b) { return reach[a] > reach[b]; });
+  double widest = 0;
+  for (std::size_t i = 0; i < order.size() && 2 * reach[order[i]] > widest; ++i)
+    for (std::size_t j = i + 1; j < order.size() && reach[order[i]] + reach[order[j]] > widest; ++j)
+      widest = std::max(widest, (vertices.row(order[i]) - vertices.row(order[j])).norm());
+  return widest;
 }
 
 double meanVertexDistance(const Vertices& one, const Vertices& two) { return vertexDistances(one, two).mean(); }

@@ -3,6 +3,7 @@
 #include <cmath>
 #include <limits>
 
+#include "core/mesh/quality.h"
 #include "core/shell/area_logs.h"
 #include "core/shell/membrane_density.h"
 
@@ -155,7 +156,8 @@ void addSecondCurvature(const Topology& topology, const ShellMeasures& undeforme
 }
 
 double defaultBending(const Vertices& shape) {
-  return 2.5e-5 * (shape.colwise().maxCoeff() - shape.colwise().minCoeff()).squaredNorm();
+  const double size = diameter(shape);
+  return 2.5e-5 * size * size;
 }
 
 }  // namespace shaped

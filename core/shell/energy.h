@@ -42,7 +42,8 @@ void addMixedHessian(const ShellStructure& structure, const Vertices& undeformed
                      const ShellMeasures& deformed_measures, double bending, double weight,
                      GeneralBlockMatrix& matrix);
 
-/// eta when the user names none: 2.5e-5 times the squared bounding-box diagonal, about 1e-4 m^2 for a person.
+/// eta when the user names none [m^2]: 2.5e-5 times the squared diameter, about 1e-4 m^2 for a person. It scales with the
+/// square of the size, and a rigid motion of the shape leaves it as it is.
 double defaultBending(const Vertices& shape);
 
 }  // namespace shaped

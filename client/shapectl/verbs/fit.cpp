@@ -104,7 +104,7 @@ struct Fit {
     arguments.option("-o,--out", out, "OUT.npy", "Write the shapes, n x V x 3 [m]");
     arguments.option("--report", report_file, "R.json", "Write how each frame and marker fits");
     arguments.option("--modes", modes, "J", "Principal variations to use (all)");
-    arguments.option("--prior-weight", prior_weight, "G", "Weight of the model against the markers (0.1)");
+    arguments.option("--prior-weight", prior_weight, "G", "Weight of the model against the markers (1)");
     arguments.option("--scale", scale, "S", "Size of the subject over that of the model (estimated)");
   }
 

@@ -35,7 +35,7 @@ struct Interpolate {
     arguments.option("--frames", frames, "N", "Shapes to make, evenly spaced (K + 1 when there is -o)");
     arguments.option("--from", from, "T0", "Where the frames begin: 0 is A, 1 is B (0)");
     arguments.option("--to", to, "T1", "Where they end; outside [0, 1] extrapolates (1)");
-    arguments.option("--bending", bending, "ETA", "Bending weight [m^2] (2.5e-5 times the squared box diagonal)");
+    arguments.option("--bending", bending, "ETA", "Bending weight [m^2] (2.5e-5 times the squared diameter)");
     arguments.option("-o,--out", out, "OUTDIR", "Write the frames there as PLY");
   }
 

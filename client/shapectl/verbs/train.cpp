@@ -22,7 +22,7 @@ struct Train {
     arguments.option("--frames", frames_file, "F.npy", "With --template: the shapes, n x V x 3, in metres");
     arguments.option("--modes", modes, "J", "Principal variations, 1 to n - 1 (20)");
     arguments.option("--path-steps", path_steps, "K", "Steps of each discrete geodesic (4)");
-    arguments.option("--bending", bending, "ETA", "Bending weight [m^2] (2.5e-5 times the squared box diagonal)");
+    arguments.option("--bending", bending, "ETA", "Bending weight [m^2] (2.5e-5 times the squared diameter)");
     arguments.option("--coarse-vertices", coarse_vertices, "N", "Solve on a mesh of at most so many vertices (1000)");
     arguments.flag("--publish-unconverged", publish_unconverged, "Publish the model even if it did not converge");
   }

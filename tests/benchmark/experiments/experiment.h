@@ -27,6 +27,7 @@ void row4PathSteps();
 void row5Training();
 void row6Projection();
 void row7Generalisation();
+void row8RealTrial();
 void row9VirtualTrials();
 void row10HandleEdits();
 void row11RigidMotions();

@@ -116,6 +116,7 @@ TEST_CASE("scaling every input by s and eta by s^2 scales the energies by s^2 an
   const Vertices a = uneven(pipe, -0.7), b = bend(pipe.vertices, 1.4);
   const auto path = calculus.interpolate(a, b, 4, {}).solution;
   const auto beyond = calculus.at(path, 1.5, {}).solution;
+  CHECK(defaultBending(moveRigidly(pipe.vertices, 5)) == Approx(calculus.bending()).epsilon(1e-12));
   for (const double s : {1e-3, 1e3}) {
     CHECK(defaultBending(s * pipe.vertices) == Approx(s * s * calculus.bending()).epsilon(1e-12));
     const GeodesicCalculus scaled(calculus.structure(), s * s * calculus.bending());

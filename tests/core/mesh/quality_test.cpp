@@ -3,8 +3,10 @@
 #include <catch2/catch.hpp>
 
 #include "core/numerics/error.h"
+#include "tests/support/shapes.h"
 
 using namespace shaped;
+using namespace shaped::test;
 
 namespace {
 
@@ -70,4 +72,18 @@ TEST_CASE("distances between corresponding vertices") {
   CHECK(maxVertexDistance(cube.vertices, moved) == Approx(4));
   CHECK_THROWS_WITH(meanVertexDistance(cube.vertices, moved.topRows(3)), Catch::Contains("has 3 vertices, want 8"));
   CHECK_THROWS_AS(maxVertexDistance(Vertices(0, 3), Vertices(0, 3)), InvalidInput);
+}
+
+TEST_CASE("the diameter is the largest distance of any two vertices, however they stand") {
+  CHECK(diameter(Vertices()) == 0);
+  CHECK(diameter(Cube().vertices) == Approx(std::sqrt(3.0)));
+  const auto pipe = tube(9, 6);
+  double widest = 0;
+  for (Eigen::Index i = 0; i < pipe.vertices.rows(); ++i)
+    for (Eigen::Index j = 0; j < i; ++j)
+      widest = std::max(widest, (pipe.vertices.row(i) - pipe.vertices.row(j)).norm());
+  CHECK(diameter(pipe.vertices) == widest);
+  const Vertices moved = moveRigidly(pipe.vertices, 3);
+  CHECK(diameter(moved) == Approx(widest).epsilon(1e-13));
+  CHECK(std::abs(boundingBoxDiagonal(moved) / boundingBoxDiagonal(pipe.vertices) - 1) > 1e-3);  // the control
 }
