@@ -1,5 +1,8 @@
 #include "core/editing/handle_edit.h"
 
+#include <limits>
+
+#include "core/editing/projection_accelerator.h"
 #include "core/mesh/alignment.h"
 #include "core/mesh/quality.h"
 #include "core/numerics/error.h"
@@ -18,20 +21,39 @@ class HandleEditor {
  public:
   HandleEditor(const Submanifold& submanifold, const std::vector<AnchorTarget>& handles, const HandleEditOptions& options)
       : submanifold_(submanifold), calculus_(submanifold.calculus()), handles_(handles), options_(options),
-        wanted_(wantedPositions(handles)), size_(boundingBoxDiagonal(submanifold.pga().mean)) {}
+        wanted_(wantedPositions(handles)), size_(boundingBoxDiagonal(submanifold.pga().mean)),
+        accelerator_(submanifold) {}
 
   Solved<HandleEdit> run();
 
  private:
-  void start();
+  /// One point of the alternation: a shape that meets the handles, and its projection.
+  struct State {
+    Vertices shape;
+    SubmanifoldProjection projection;
+    double energy = std::numeric_limits<double>::infinity();  ///< W[shape, projection]
+  };
+
+  /// A prior that a round starts from, with its coordinates.
+  struct Start {
+    SubmanifoldPoint point;
+    Vertices shape;
+    bool extrapolated = false;
+  };
+
+  void place();
   Outcome approach();
-  Outcome meetHandles();
-  bool improveProjection(Outcome& outcome);
-  double handleDistance() const {
-    return (anchorPositions(calculus_.topology(), handles_, edit_.shape) - wanted_).rowwise().norm().maxCoeff();
+  Outcome meetHandles(const Vertices& prior, Vertices& shape);
+  Outcome round(const Vertices& prior, State& state);
+  double relativeFall(const State& before, const State& after) const;
+  Start plainStart() const { return {state_.projection.point, state_.projection.shape, false}; }
+  void chooseStart(const Start& last, Outcome& outcome);
+  Outcome alternate();
+  double handleDistance(const Vertices& shape) const {
+    return (anchorPositions(calculus_.topology(), handles_, shape) - wanted_).rowwise().norm().maxCoeff();
   }
-  double energy(const Vertices& projection) const {
-    return shellEnergy(calculus_.topology(), edit_.shape, projection, calculus_.bending());
+  double energy(const Vertices& shape, const Vertices& projection) const {
+    return shellEnergy(calculus_.topology(), shape, projection, calculus_.bending());
   }
 
   const Submanifold& submanifold_;
@@ -40,16 +62,22 @@ class HandleEditor {
   const HandleEditOptions& options_;
   Vertices wanted_;
   double size_;
-  HandleEdit edit_;
-  Vertices prior_;
+  ProjectionAccelerator accelerator_;
+  State state_;
+  Start start_;
+  std::vector<AnchorTarget> shifted_;  ///< the handles with the multipliers of the last constrained solve
+  std::vector<double> energies_;
 };
 
 /// The mean, placed by its handle points.
-void HandleEditor::start() {
+void HandleEditor::place() {
   for (auto& handle : handles_) handle.weight = 1;
-  const Vertices& mean = submanifold_.pga().mean;
-  edit_.shape = apply(alignRigidly(anchorPositions(calculus_.topology(), handles_, mean), wanted_), mean);
-  prior_ = edit_.shape;
+  const auto& pga = submanifold_.pga();
+  state_.shape = apply(alignRigidly(anchorPositions(calculus_.topology(), handles_, pga.mean), wanted_), pga.mean);
+  state_.projection.point = submanifold_.pointOf(Eigen::VectorXd::Zero(pga.modes()));
+  state_.projection.shape = state_.projection.local = state_.shape;
+  shifted_ = handles_;
+  for (auto& handle : shifted_) handle.weight = 100;
 }
 
 /// Soft handles with growing weights, the projection following: from the mean to the neighbourhood of the solution.
@@ -57,76 +85,108 @@ Outcome HandleEditor::approach() {
   Outcome outcome;
   for (const double weight : {0.03, 0.3}) {
     for (auto& handle : handles_) handle.weight = weight;
-    auto fit = fitAnchored(calculus_, prior_, handles_, edit_.shape, {1, 60, 1e-4, options_.submanifold.stop});
-    edit_.shape = std::move(fit.solution);
-    auto projected = submanifold_.project(edit_.shape, options_.submanifold,
-                                          edit_.projection.geodesic.empty() ? nullptr : &edit_.projection);
+    auto fit = fitAnchored(calculus_, state_.projection.shape, handles_, state_.shape,
+                           {1, 60, 1e-4, options_.submanifold.stop});
+    state_.shape = std::move(fit.solution);
+    auto projected = submanifold_.project(state_.shape, options_.submanifold,
+                                          state_.projection.geodesic.empty() ? nullptr : &state_.projection);
     outcome.iterations += fit.iterations + projected.iterations;
     if (!projected.converged()) break;
-    edit_.projection = std::move(projected.solution);
-    prior_ = edit_.projection.shape;
+    state_.projection = std::move(projected.solution);
   }
   return outcome;
 }
 
 /// min over s of W[s, prior] with the handles met: shifting the targets by the accumulated misses is the augmented
-/// Lagrangian's multiplier update.
-Outcome HandleEditor::meetHandles() {
+/// Lagrangian's multiplier update. The multipliers hardly change from round to round, so each starts with the last ones.
+Outcome HandleEditor::meetHandles(const Vertices& prior, Vertices& shape) {
   Outcome outcome;
-  auto shifted = handles_;
-  for (auto& handle : shifted) handle.weight = 100;
-  for (int round = 0; round < 30; ++round) {
-    auto fit = fitAnchored(calculus_, prior_, shifted, edit_.shape, {1, 60, 1e-9, options_.submanifold.stop});
-    edit_.shape = std::move(fit.solution);
+  for (int update = 0; update < 30; ++update) {
+    auto fit = fitAnchored(calculus_, prior, shifted_, shape, {1, 60, 1e-9, options_.submanifold.stop});
+    shape = std::move(fit.solution);
     outcome.iterations += fit.iterations;
-    outcome.residual = handleDistance() / size_;
+    outcome.residual = handleDistance(shape) / size_;
     outcome.termination = fit.termination;
     if (outcome.residual <= options_.handle_tolerance || fit.termination == Termination::kCancelled) break;
-    const Vertices miss = anchorPositions(calculus_.topology(), handles_, edit_.shape) - wanted_;
-    for (std::size_t l = 0; l < shifted.size(); ++l)
-      shifted[l].position -= miss.row(static_cast<Eigen::Index>(l)).transpose();
+    const Vertices miss = anchorPositions(calculus_.topology(), handles_, shape) - wanted_;
+    for (std::size_t l = 0; l < shifted_.size(); ++l)
+      shifted_[l].position -= miss.row(static_cast<Eigen::Index>(l)).transpose();
     outcome.termination = Termination::kIterationLimit;
   }
   return outcome;
 }
 
-/// Takes P[s] when it lowers the energy.
-bool HandleEditor::improveProjection(Outcome& outcome) {
-  auto projected = submanifold_.project(edit_.shape, options_.submanifold,
-                                        edit_.projection.geodesic.empty() ? nullptr : &edit_.projection);
-  outcome.iterations += projected.iterations;
-  if (!projected.converged()) {
-    outcome.termination = projected.termination;
-    return false;
+/// s for this prior, then P[s].
+Outcome HandleEditor::round(const Vertices& prior, State& state) {
+  Outcome outcome = meetHandles(prior, state.shape);
+  outcome.residual = 0;  // of the handles; the alternation has its own
+  if (!outcome.converged()) return outcome;
+  auto projected = submanifold_.project(state.shape, options_.submanifold,
+                                        state.projection.geodesic.empty() ? nullptr : &state.projection);
+  outcome += projected;
+  if (!projected.converged()) return outcome;
+  state.projection = std::move(projected.solution);
+  state.energy = energy(state.shape, state.projection.shape);
+  return outcome;
+}
+
+/// Over the energy plus a hundredth of the squared distance that the edit moves the model: where the submanifold meets
+/// the handles the energy itself goes to zero.
+double HandleEditor::relativeFall(const State& before, const State& after) const {
+  const double reach = energy(submanifold_.pga().mean, after.projection.shape);
+  return (before.energy - after.energy) / (after.energy + 1e-2 * reach);
+}
+
+/// Where the next round starts: at the last projection, or ahead of it where the accelerator sees a way.
+void HandleEditor::chooseStart(const Start& last, Outcome& outcome) {
+  accelerator_.add(last.point, state_.projection.point);
+  start_ = plainStart();
+  const auto point = accelerator_.propose();
+  if (!point) return;
+  auto ahead = submanifold_.shapeOf(*point, options_.submanifold, &state_.projection);
+  outcome.iterations += ahead.iterations;
+  if (ahead.converged()) start_ = {*point, std::move(ahead.solution), true};
+}
+
+Outcome HandleEditor::alternate() {
+  Outcome outcome{Termination::kIterationLimit, 0, 1};
+  int small_falls = 0;  // in a row
+  for (int outer = 0; outer < options_.outer_iterations; ++outer) {
+    State next = state_;
+    const auto done = round(start_.shape, next);
+    outcome.iterations += done.iterations;
+    const bool better = done.converged() && next.energy < state_.energy;
+    if (!better && start_.extrapolated && done.termination != Termination::kCancelled) {
+      accelerator_.forget();  // it led astray: back to plain alternation from the last state
+      start_ = plainStart();
+      continue;
+    }
+    if (!done.converged()) {
+      if (energies_.empty()) state_ = std::move(next);
+      return {done.termination, outcome.iterations, outcome.residual};
+    }
+    if (!better) return {Termination::kConverged, outcome.iterations, 0};  // P[s] cannot lower the energy
+    energies_.push_back(next.energy);
+    outcome.residual = energies_.size() > 1 ? relativeFall(state_, next) : 1;
+    // a plain step may be short because the alternation is slow, so the extrapolated one after it must be short too
+    small_falls = outcome.residual <= options_.tolerance ? small_falls + 1 : 0;
+    state_ = std::move(next);
+    if (small_falls == 2) return {Termination::kConverged, outcome.iterations, outcome.residual};
+    chooseStart(Start(start_), outcome);
   }
-  if (!edit_.projection.geodesic.empty() && energy(projected.solution.shape) >= energy(prior_)) return false;
-  edit_.projection = std::move(projected.solution);
-  prior_ = edit_.projection.shape;
-  return true;
+  return outcome;
 }
 
 Solved<HandleEdit> HandleEditor::run() {
-  start();
-  Outcome outcome = approach();
-  for (int outer = 0;; ++outer) {
-    const auto met = meetHandles();
-    outcome.iterations += met.iterations;
-    outcome.termination = met.termination;
-    edit_.largest_handle_distance = handleDistance();
-    if (!met.converged()) break;
-    const bool moved = improveProjection(outcome);
-    edit_.energies.push_back(energy(prior_));
-    const auto count = edit_.energies.size();
-    outcome.residual = count > 1 ? 1 - edit_.energies[count - 1] / edit_.energies[count - 2] : 1.0;
-    if (!outcome.converged()) break;
-    if (!moved || outcome.residual <= options_.tolerance) break;
-    if (outer + 1 >= options_.outer_iterations) {
-      outcome.termination = Termination::kIterationLimit;
-      break;
-    }
-  }
-  edit_.projection.shape = apply(alignRigidly(edit_.projection.shape, edit_.shape), edit_.projection.shape);
-  return {std::move(edit_), outcome};
+  place();
+  const auto approached = approach();
+  start_ = plainStart();
+  auto outcome = alternate();
+  outcome.iterations += approached.iterations;
+  HandleEdit edit{std::move(state_.shape), std::move(state_.projection), std::move(energies_), 0};
+  edit.largest_handle_distance = handleDistance(edit.shape);
+  edit.projection.shape = apply(alignRigidly(edit.projection.shape, edit.shape), edit.projection.shape);
+  return {std::move(edit), outcome};
 }
 
 }  // namespace

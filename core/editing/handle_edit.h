@@ -14,15 +14,17 @@ struct HandleEdit {
 };
 
 struct HandleEditOptions {
-  int outer_iterations = 10;     ///< alternations, >= 1
-  double tolerance = 1e-3;       ///< relative fall of W[s, P[s]] at which the alternation has settled, > 0
+  int outer_iterations = 40;     ///< alternations at most, >= 1
+  double tolerance = 1e-3;       ///< fall of W[s, P[s]] in one alternation, over itself, at which it has settled, > 0
   double handle_tolerance = 1e-8;  ///< largest distance of a handle over the size of the shape, > 0
-  SubmanifoldOptions submanifold;
+  /// Looser than elsewhere: the alternation itself is not settled more closely.
+  SubmanifoldOptions submanifold{.tolerance = 1e-4, .shape_tolerance = 1e-6, .stop = {}};
 };
 
 /// Minimises W[s, P[s]] subject to the handles by alternating between s (Newton's method with the handles as
-/// constraints, by an augmented Lagrangian) and P[s]. A projection that would raise the energy is not taken, so the
-/// energies fall; the outcome is converged when they settle. Weights of the handles are not used. The handles must
+/// constraints, by an augmented Lagrangian) and P[s], accelerated by extrapolation (ProjectionAccelerator). What would
+/// raise the energy is not taken, so the energies fall; the outcome is converged when they settle: when one alternation
+/// lowers W[s, P[s]] by less than `tolerance` of itself plus a hundredth of W[mean, P[s]]. Weights of the handles are not used. The handles must
 /// determine the placement (determinePlacement), else InvalidInput naming "handles".
 Solved<HandleEdit> editByHandles(const Submanifold& submanifold, const std::vector<AnchorTarget>& handles,
                                  const HandleEditOptions& options);

@@ -94,7 +94,8 @@ Solved<ShellPgaEdit> edit(const ShellPgaModel& model, const std::vector<Handle>&
     throw InvalidInput("outer_iterations", std::to_string(options.outer_iterations) + ", want >= 1");
   HandleEditOptions edit_options;
   edit_options.outer_iterations = options.outer_iterations;
-  edit_options.submanifold = submanifoldOptions(options.modes, options.stop);
+  edit_options.submanifold.modes = options.modes;
+  edit_options.submanifold.stop = options.stop;
   auto coarse = editByHandles(model.submanifold(), targetsOf(model, handles), edit_options);
   Outcome outcome = coarse;
   ShellPgaEdit result;

@@ -51,7 +51,7 @@ struct Handle {
 
 struct EditOptions {
   int modes = 0;              ///< J to use, 0 = all of the model's
-  int outer_iterations = 10;  ///< alternations between s and P[s], >= 1
+  int outer_iterations = 40;  ///< alternations between s and P[s] at most, >= 1
   std::stop_token stop;
 };
 

@@ -247,7 +247,8 @@ Solved<Vertices> Submanifold::march(const Vertices& local, double scale, int ste
   return {std::move(here), outcome};
 }
 
-Solved<Vertices> Submanifold::shapeOf(const SubmanifoldPoint& point, const SubmanifoldOptions& options) const {
+Solved<Vertices> Submanifold::shapeOf(const SubmanifoldPoint& point, const SubmanifoldOptions& options,
+                                      const SubmanifoldProjection* warm) const {
   if (point.alpha.size() != forces_.size())
     throw InvalidInput(
         "alpha", "has " + std::to_string(point.alpha.size()) + " entries, want " + std::to_string(forces_.size()));
@@ -256,8 +257,8 @@ Solved<Vertices> Submanifold::shapeOf(const SubmanifoldPoint& point, const Subma
   if (!(std::abs(point.alpha.sum() - 1) < 1e-6))
     throw InvalidInput("alpha", "sums to " + std::to_string(point.alpha.sum()) + ", want 1");
   if (!(point.scale > 0) || !std::isfinite(point.scale)) throw InvalidInput("scale", "must be a positive number");
-  const auto local = average(point.alpha, pga_->mean, options);
-  auto scaled = rescale(local.solution, point.scale, {}, options);
+  const auto local = average(point.alpha, warm ? warm->local : pga_->mean, options);
+  auto scaled = rescale(local.solution, point.scale, warm && warm->geodesic.size() > 1 ? warm->geodesic[1] : Vertices(), options);
   Outcome outcome = local;
   outcome += scaled;
   return {std::move(scaled.solution), outcome};

@@ -44,8 +44,10 @@ class Submanifold {
   Solved<SubmanifoldProjection> project(const Vertices& shape, const SubmanifoldOptions& options,
                                         const SubmanifoldProjection* warm = nullptr) const;
 
-  /// The shape of a point, (16). Throws InvalidInput naming "alpha" or "scale" when the point is not one of M_J.
-  Solved<Vertices> shapeOf(const SubmanifoldPoint& point, const SubmanifoldOptions& options) const;
+  /// The shape of a point, (16). warm: the projection of a similar shape, or null. Throws InvalidInput naming "alpha" or
+  /// "scale" when the point is not one of M_J.
+  Solved<Vertices> shapeOf(const SubmanifoldPoint& point, const SubmanifoldOptions& options,
+                           const SubmanifoldProjection* warm = nullptr) const;
 
   /// Coordinates in the principal components [m]: y_j = (alpha_j - alpha_-j) dist(mean, p_j) / scale, the logarithm of
   /// the point to first order. Their variance over the training shapes is the eigenvalue.

@@ -21,7 +21,7 @@ struct Edit {
     arguments.option("-o,--out", out, "OUT.ply", "Write the shape that meets the handles");
     arguments.required();
     arguments.option("--modes", modes, "J", "Principal variations to use (all)");
-    arguments.option("--outer-iterations", outer_iterations, "N", "Alternations at most (10)");
+    arguments.option("--outer-iterations", outer_iterations, "N", "Alternations at most (40)");
   }
 
   ExitCode run(const Session& session) const {
