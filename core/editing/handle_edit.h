@@ -18,7 +18,7 @@ struct HandleEditOptions {
   double tolerance = 1e-3;       ///< fall of W[s, P[s]] in one alternation, over itself, at which it has settled, > 0
   double handle_tolerance = 1e-8;  ///< largest distance of a handle over the size of the shape, > 0
   /// Looser than elsewhere: the alternation itself is not settled more closely.
-  SubmanifoldOptions submanifold{.tolerance = 1e-4, .shape_tolerance = 1e-6, .stop = {}};
+  SubmanifoldOptions submanifold{.tolerance = 1e-4, .shape_tolerance = 1e-5, .stop = {}};
 };
 
 /// Minimises W[s, P[s]] subject to the handles by alternating between s (Newton's method with the handles as

@@ -12,7 +12,7 @@ void ProjectionAccelerator::add(const SubmanifoldPoint& input, const Submanifold
 }
 
 std::optional<SubmanifoldPoint> ProjectionAccelerator::propose() const {
-  constexpr double reach = 10;
+  constexpr double reach = 30;
   if (steps_.size() < 2) return std::nullopt;
   const auto& last = steps_.back();
   const auto count = static_cast<Eigen::Index>(steps_.size()) - 1;
@@ -27,9 +27,15 @@ std::optional<SubmanifoldPoint> ProjectionAccelerator::propose() const {
   const Eigen::VectorXd weights = least_squares.compute(step_changes).solve(last.step);
   Eigen::VectorXd move = -end_changes * weights;
   const auto point = [&](double length) {
-    const Eigen::VectorXd v = (last.end + length * move).cwiseMax(0);
-    const double total = v.sum();
-    return SubmanifoldPoint{v / total, 1 / total};
+    const Eigen::VectorXd v = last.end + length * move;
+    const auto half = v.size() / 2;
+    // a weight below zero is one above zero on the opposite variation
+    const Eigen::VectorXd below = (-v).cwiseMax(0);
+    Eigen::VectorXd valid = v.cwiseMax(0);
+    valid.head(half) += below.tail(half);
+    valid.tail(half) += below.head(half);
+    const double total = valid.sum();
+    return SubmanifoldPoint{valid / total, 1 / total};
   };
   const SubmanifoldPoint end{last.end / last.end.sum(), 1 / last.end.sum()};
   const double distance =

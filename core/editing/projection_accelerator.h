@@ -19,7 +19,7 @@ class ProjectionAccelerator {
   /// Remembers that a round which started at `input` ended at `output`.
   void add(const SubmanifoldPoint& input, const SubmanifoldPoint& output);
 
-  /// Where the iteration seems to go; empty while there are not two steps to tell. The proposal lies at most ten times
+  /// Where the iteration seems to go; empty while there are not two steps to tell. The proposal lies at most thirty times
   /// the last step away.
   std::optional<SubmanifoldPoint> propose() const;
 

@@ -14,11 +14,11 @@ enum class Unknown { kDeformed, kUndeformed };
 
 class BalanceSolver {
  public:
-  BalanceSolver(const ShellStructure& structure, double bending, const Vertices& current, Unknown unknown,
+  BalanceSolver(const ShellStructure& structure, const PairEnergy& energy, const Vertices& current, Unknown unknown,
                 const Vertices& known_neighbour, double force)
       : structure_(structure),
         topology_(structure.topology()),
-        bending_(bending),
+        energy_(energy),
         unknown_(unknown),
         current_(current),
         current_measures_(measure(topology_, current)),
@@ -28,11 +28,11 @@ class BalanceSolver {
     const auto neighbour = measure(topology_, known_neighbour);
     MeasureGradient gradient(topology_);
     if (unknown == Unknown::kDeformed)
-      addSecondGradient(topology_, neighbour, current_measures_, bending_, 1, gradient);
+      energy.addSecondGradient(topology_, neighbour, current_measures_, 1, gradient);
     else
-      addFirstGradient(topology_, current_measures_, neighbour, bending_, 1, gradient);
+      energy.addFirstGradient(topology_, current_measures_, neighbour, 1, gradient);
     known_ = force * pullBack(gradient);
-    floor_ = forceFloor(topology_, current_, current_measures_, bending_);
+    floor_ = forceFloor(topology_, current_, current_measures_, energy_.bending());
     factoriseMetric();
   }
 
@@ -59,16 +59,16 @@ class BalanceSolver {
     if (!(measures.area.minCoeff() > 0)) return Eigen::VectorXd::Constant(x.size(), std::nan(""));
     MeasureGradient gradient(topology_);
     if (unknown_ == Unknown::kDeformed)
-      addFirstGradient(topology_, current_measures_, measures, bending_, 1, gradient);
+      energy_.addFirstGradient(topology_, current_measures_, measures, 1, gradient);
     else
-      addSecondGradient(topology_, measures, current_measures_, bending_, 1, gradient);
+      energy_.addSecondGradient(topology_, measures, current_measures_, 1, gradient);
     return pullBack(gradient);
   }
 
   /// The metric of shape space at `current`, half the Hessian of W[current, .] at rest.
   void factoriseMetric() {
     MeasureCurvature curvature(topology_, HessianKind::kExact);
-    addSecondCurvature(topology_, current_measures_, current_measures_, bending_, 1, curvature);
+    energy_.addSecondCurvature(topology_, current_measures_, current_measures_, 1, curvature);
     SymmetricBlockMatrix hessian(structure_.pattern());
     pullBackHessian(structure_, current_, curvature, hessian);
     usable_ = metric_.factorise(hessian, pins_);
@@ -84,7 +84,7 @@ class BalanceSolver {
 
   const ShellStructure& structure_;
   const Topology& topology_;
-  double bending_;
+  PairEnergy energy_;
   Unknown unknown_;
   Vertices current_;
   ShellMeasures current_measures_;
@@ -100,9 +100,9 @@ Eigen::VectorXd BalanceSolver::direction(const Vertices& x, const Eigen::VectorX
   const auto measures = measure(topology_, x);
   mixed_.setZero();
   if (unknown_ == Unknown::kDeformed)
-    addMixedHessian(structure_, current_, current_measures_, x, measures, bending_, 1, mixed_);
+    energy_.addMixedHessian(structure_, current_, current_measures_, x, measures, 1, mixed_);
   else
-    addMixedHessian(structure_, x, measures, current_, current_measures_, bending_, 1, mixed_);
+    energy_.addMixedHessian(structure_, x, measures, current_, current_measures_, 1, mixed_);
   const auto apply = [&](const Eigen::VectorXd& v, Eigen::VectorXd& y) {
     y.setZero(v.size());
     if (unknown_ == Unknown::kDeformed)
@@ -179,15 +179,15 @@ Solved<Vertices> solveBalance(BalanceSolver solver, const Vertices& start, const
 
 }  // namespace
 
-Solved<Vertices> solveForDeformed(const ShellStructure& structure, double bending, const Vertices& previous,
+Solved<Vertices> solveForDeformed(const ShellStructure& structure, const PairEnergy& energy, const Vertices& previous,
                                   const Vertices& current, const Vertices& start, const GeodesicOptions& options,
                                   double force) {
-  return solveBalance(BalanceSolver(structure, bending, current, Unknown::kDeformed, previous, force), start, options);
+  return solveBalance(BalanceSolver(structure, energy, current, Unknown::kDeformed, previous, force), start, options);
 }
 
-Solved<Vertices> solveForUndeformed(const ShellStructure& structure, double bending, const Vertices& current,
+Solved<Vertices> solveForUndeformed(const ShellStructure& structure, const PairEnergy& energy, const Vertices& current,
                                     const Vertices& next, const Vertices& start, const GeodesicOptions& options) {
-  return solveBalance(BalanceSolver(structure, bending, current, Unknown::kUndeformed, next, 1), start, options);
+  return solveBalance(BalanceSolver(structure, energy, current, Unknown::kUndeformed, next, 1), start, options);
 }
 
 }  // namespace shaped

@@ -10,12 +10,12 @@ namespace shaped {
 /// No energy has this equation as its gradient, so Newton's method is guarded by the forces' size in the inverse metric
 /// of `current`, and where a full problem does not converge the known force is switched on in stages from `current`,
 /// whose solution is known. The residual is the norm of the imbalance over the sum of the norms of the two forces.
-Solved<Vertices> solveForDeformed(const ShellStructure& structure, double bending, const Vertices& previous,
+Solved<Vertices> solveForDeformed(const ShellStructure& structure, const PairEnergy& energy, const Vertices& previous,
                                   const Vertices& current, const Vertices& start, const GeodesicOptions& options,
                                   double force = 1);
 
 /// The same equation for x = previous and force = 1: W,2[x, current] + W,1[current, next] = 0.
-Solved<Vertices> solveForUndeformed(const ShellStructure& structure, double bending, const Vertices& current,
+Solved<Vertices> solveForUndeformed(const ShellStructure& structure, const PairEnergy& energy, const Vertices& current,
                                     const Vertices& next, const Vertices& start, const GeodesicOptions& options);
 
 }  // namespace shaped

@@ -35,10 +35,11 @@ void forEach(std::size_t count, const Body& body) {
 /// Newton's method on a network: the state at one iterate and the linear algebra over its tree.
 class NetworkNewton {
  public:
-  NetworkNewton(const ShellStructurePtr& structure, double bending, ElasticNetwork network, std::stop_token stop)
+  NetworkNewton(const ShellStructurePtr& structure, const PairEnergy& energy, ElasticNetwork network,
+                std::stop_token stop)
       : structure_(structure),
         topology_(structure->topology()),
-        bending_(bending),
+        energy_(energy),
         stop_(std::move(stop)),
         network_(std::move(network)),
         tree_(network_),
@@ -80,7 +81,7 @@ class NetworkNewton {
 
   ShellStructurePtr structure_;
   const Topology& topology_;
-  double bending_;
+  PairEnergy energy_;
   std::stop_token stop_;
   ElasticNetwork network_;
   NetworkTree tree_;
@@ -98,16 +99,18 @@ double NetworkNewton::nodeGradient(std::size_t n) {
   const auto self = static_cast<std::size_t>(node.index);
   Vertices total = Vertices::Zero(network_.nodes[self].rows(), 3), force(total.rows(), 3);
   MeasureGradient measures(topology_);
-  const double floor = forceFloor(topology_, network_.nodes[self], measures_[self], bending_);
+  const double floor = forceFloor(topology_, network_.nodes[self], measures_[self], energy_.bending());
   double scale = 0;
   for (const auto s : node.segments) {
     const auto& segment = network_.segments[static_cast<std::size_t>(s)];
-    const bool first = segment.from == node.index;
     measures.setZero();
     force.setZero();
-    (first ? addFirstGradient : addSecondGradient)(topology_, measures_[static_cast<std::size_t>(segment.from)],
-                                                   measures_[static_cast<std::size_t>(segment.to)], bending_,
-                                                   segment.weight, measures);
+    const auto &from = measures_[static_cast<std::size_t>(segment.from)],
+               &to = measures_[static_cast<std::size_t>(segment.to)];
+    if (segment.from == node.index)
+      energy_.addFirstGradient(topology_, from, to, segment.weight, measures);
+    else
+      energy_.addSecondGradient(topology_, from, to, segment.weight, measures);
     pullBackGradient(topology_, network_.nodes[self], measures, force);
     total += force;
     scale += force.norm() + segment.weight * floor;
@@ -130,10 +133,12 @@ void NetworkNewton::addNodeCurvature(std::size_t n, MeasureCurvature& curvature)
   const auto& node = tree_.nodes[n];
   for (const auto s : node.segments) {
     const auto& segment = network_.segments[static_cast<std::size_t>(s)];
-    const bool first = segment.from == node.index;
-    (first ? addFirstCurvature : addSecondCurvature)(topology_, measures_[static_cast<std::size_t>(segment.from)],
-                                                     measures_[static_cast<std::size_t>(segment.to)], bending_,
-                                                     segment.weight, curvature);
+    const auto &from = measures_[static_cast<std::size_t>(segment.from)],
+               &to = measures_[static_cast<std::size_t>(segment.to)];
+    if (segment.from == node.index)
+      energy_.addFirstCurvature(topology_, from, to, segment.weight, curvature);
+    else
+      energy_.addSecondCurvature(topology_, from, to, segment.weight, curvature);
   }
 }
 
@@ -160,8 +165,8 @@ bool NetworkNewton::updateHessian() {
     const auto& segment = network_.segments[static_cast<std::size_t>(tree_.nodes[n].parent_segment)];
     const auto from = static_cast<std::size_t>(segment.from), to = static_cast<std::size_t>(segment.to);
     couplings_[n]->setZero();
-    addMixedHessian(*structure_, network_.nodes[from], measures_[from], network_.nodes[to], measures_[to], bending_,
-                    segment.weight, *couplings_[n]);
+    energy_.addMixedHessian(*structure_, network_.nodes[from], measures_[from], network_.nodes[to], measures_[to],
+                            segment.weight, *couplings_[n]);
   });
   return std::all_of(done.begin(), done.end(), [](char d) { return d != 0; });
 }
@@ -249,8 +254,8 @@ double NetworkNewton::energy(const std::vector<ShellMeasures>& measures) const {
   std::vector<double> parts(network_.segments.size());
   forEach(parts.size(), [&](std::size_t s) {
     const auto& segment = network_.segments[s];
-    parts[s] = segment.weight * shellEnergy(topology_, measures[static_cast<std::size_t>(segment.from)],
-                                            measures[static_cast<std::size_t>(segment.to)], bending_);
+    parts[s] = segment.weight * energy_.value(topology_, measures[static_cast<std::size_t>(segment.from)],
+                                              measures[static_cast<std::size_t>(segment.to)]);
   });
   return std::accumulate(parts.begin(), parts.end(), 0.0);
 }
@@ -277,10 +282,10 @@ bool NetworkNewton::step(const NodeVectors& direction) {
 
 }  // namespace
 
-Solved<ElasticNetwork> relax(const ShellStructurePtr& structure, double bending, ElasticNetwork network,
+Solved<ElasticNetwork> relax(const ShellStructurePtr& structure, const PairEnergy& energy, ElasticNetwork network,
                              const NetworkOptions& options) {
   const auto start = network.nodes;
-  NetworkNewton run(structure, bending, std::move(network), options.stop);
+  NetworkNewton run(structure, energy, std::move(network), options.stop);
   Outcome outcome;
   for (outcome.iterations = 0;; ++outcome.iterations) {
     outcome.residual = run.updateGradient();
@@ -308,13 +313,13 @@ Solved<ElasticNetwork> relax(const ShellStructurePtr& structure, double bending,
   return {std::move(result), outcome};
 }
 
-std::vector<double> segmentEnergies(const Topology& topology, double bending, const ElasticNetwork& network) {
+std::vector<double> segmentEnergies(const Topology& topology, const PairEnergy& energy, const ElasticNetwork& network) {
   std::vector<ShellMeasures> measures(network.nodes.size());
   for (std::size_t n = 0; n < measures.size(); ++n) measure(topology, network.nodes[n], measures[n]);
   std::vector<double> result;
   for (const auto& segment : network.segments)
-    result.push_back(shellEnergy(topology, measures[static_cast<std::size_t>(segment.from)],
-                                 measures[static_cast<std::size_t>(segment.to)], bending));
+    result.push_back(energy.value(topology, measures[static_cast<std::size_t>(segment.from)],
+                                  measures[static_cast<std::size_t>(segment.to)]));
   return result;
 }
 

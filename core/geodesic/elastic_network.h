@@ -5,6 +5,7 @@
 #include <vector>
 
 #include "core/numerics/solved.h"
+#include "core/shell/pair_energy.h"
 #include "core/shell/structure.h"
 
 namespace shaped {
@@ -43,10 +44,10 @@ struct NetworkOptions {
 /// its segments' forces: 0 where the forces balance. Runs parallel loops over nodes in the current TBB arena; the
 /// result does not depend on the number of threads. Cancellation is polled at every node's factorisation and every
 /// inner iteration. Rigid motions of the free nodes stay as they were at the start up to the six unknowns pinned.
-Solved<ElasticNetwork> relax(const ShellStructurePtr& structure, double bending, ElasticNetwork network,
+Solved<ElasticNetwork> relax(const ShellStructurePtr& structure, const PairEnergy& energy, ElasticNetwork network,
                              const NetworkOptions& options);
 
 /// The energies W of the segments, without their weights [m^2].
-std::vector<double> segmentEnergies(const Topology& topology, double bending, const ElasticNetwork& network);
+std::vector<double> segmentEnergies(const Topology& topology, const PairEnergy& energy, const ElasticNetwork& network);
 
 }  // namespace shaped

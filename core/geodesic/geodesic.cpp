@@ -19,9 +19,9 @@ Vertices aligned(const Vertices& shape, const Vertices& to) { return apply(align
 
 }  // namespace
 
-GeodesicCalculus::GeodesicCalculus(ShellStructurePtr structure, double bending)
+GeodesicCalculus::GeodesicCalculus(ShellStructurePtr structure, const PairEnergy& energy)
     : structure_(std::move(structure)),
-      bending_(bending),
+      energy_(energy),
       reconstruction_(std::make_shared<LengthAngleReconstruction>(structure_->topologyPtr())) {}
 
 std::vector<double> GeodesicCalculus::segmentEnergies(const Path& path) const {
@@ -29,7 +29,7 @@ std::vector<double> GeodesicCalculus::segmentEnergies(const Path& path) const {
   ShellMeasures before = measure(topology(), path.front()), after;
   for (std::size_t k = 1; k < path.size(); ++k) {
     measure(topology(), path[k], after);
-    energies.push_back(shellEnergy(topology(), before, after, bending_));
+    energies.push_back(energy_.value(topology(), before, after));
     std::swap(before, after);
   }
   return energies;
@@ -60,7 +60,7 @@ Solved<Path> GeodesicCalculus::relaxPath(Path path, const GeodesicOptions& optio
   network.free.front() = network.free.back() = false;
   for (std::int32_t k = 0; k + 1 < count; ++k) network.segments.push_back({k, k + 1, static_cast<double>(count - 1)});
   auto solved =
-      relax(structure_, bending_, std::move(network), {options.max_iterations, options.tolerance, options.stop, {}});
+      relax(structure_, energy_, std::move(network), {options.max_iterations, options.tolerance, options.stop, {}});
   return {std::move(solved.solution.nodes), solved};
 }
 
@@ -109,7 +109,7 @@ Solved<Path> GeodesicCalculus::interpolate(const Vertices& a, const Vertices& b,
       if (solved.converged() || solved.termination == Termination::kCancelled) return solved;
     }
   }
-  const double direct = shellEnergy(topology(), a, b, bending_);
+  const double direct = energy_.value(topology(), measure(topology(), a), measure(topology(), b));
   Path start = startPath(a, aligned(b, a), steps, options.stop);
   if (options.stop.stop_requested()) {
     Path untouched(static_cast<std::size_t>(steps), a);
@@ -127,15 +127,21 @@ Solved<Path> GeodesicCalculus::interpolate(const Vertices& a, const Vertices& b,
 Solved<Vertices> GeodesicCalculus::between(const Vertices& a, const Vertices& b, double t,
                                            const GeodesicOptions& options) const {
   const auto from = measure(topology(), a), to = measure(topology(), b);
-  ShellObjective objective(structure_, bending_);
-  objective.addUndeformed(from, 1 - t);
-  objective.addDeformed(to, t);
+  ShellObjective objective(structure_, bending());
+  const bool symmetric = energy_.symmetry() == EnergySymmetry::kSymmetric;
+  const double share = symmetric ? 0.5 : 1;
+  objective.addUndeformed(from, share * (1 - t));
+  objective.addDeformed(to, share * t);
+  if (symmetric) {
+    objective.addDeformed(from, share * (1 - t));
+    objective.addUndeformed(to, share * t);
+  }
   const NewtonOptions newton{options.max_iterations, options.tolerance, options.stop};
   // the minimum is about t (1 - t) W[a, b]; where the straight blend is near it, nothing better is needed
   const Vertices end = aligned(b, a);
   Vertices start = (1 - t) * a + t * end;
   const double straight = objective.value(flatten(start));
-  if (!(straight <= 2 * t * (1 - t) * shellEnergy(topology(), from, to, bending_))) {
+  if (!(straight <= 2 * t * (1 - t) * energy_.value(topology(), from, to))) {
     start = reconstruction_->reconstruct(blendMeasures(from, to, t), a);
     const Vertices& nearer = t < 0.5 ? a : end;
     if (start.rows() == 0 || !(objective.value(flatten(start)) < objective.value(flatten(nearer)))) start = nearer;
@@ -149,32 +155,33 @@ Solved<Vertices> GeodesicCalculus::through(const Vertices& a, const Vertices& in
   Vertices start = near;
   if (start.rows() == 0)
     start = reconstruction_->reconstruct(blendMeasures(measure(topology(), a), measure(topology(), inner), 1 / t), inner);
-  if (start.rows() == 0 || !std::isfinite(shellEnergy(topology(), inner, start, bending_))) start = inner;
-  return solveForDeformed(*structure_, bending_, a, inner, aligned(start, inner), options, (1 - t) / t);
+  if (start.rows() == 0 || !std::isfinite(shellEnergy(topology(), inner, start, bending()))) start = inner;
+  return solveForDeformed(*structure_, energy_, a, inner, aligned(start, inner), options, (1 - t) / t);
 }
 
 Vertices GeodesicCalculus::predict(const Vertices& previous, const Vertices& current) const {
   const auto before = measure(topology(), previous), here = measure(topology(), current);
-  const double step = shellEnergy(topology(), before, here, bending_);
+  const double step = shellEnergy(topology(), before, here, bending());
   const Vertices straight = 2 * current - aligned(previous, current);
-  const double straight_energy = shellEnergy(topology(), here, measure(topology(), straight), bending_);
+  const double straight_energy = shellEnergy(topology(), here, measure(topology(), straight), bending());
   if (straight_energy < 2 * step) return straight;
   const Vertices curved = reconstruction_->reconstruct(blendMeasures(before, here, 2), current);
   if (curved.rows() > 0) {
-    const double curved_energy = shellEnergy(topology(), here, measure(topology(), curved), bending_);
+    const double curved_energy = shellEnergy(topology(), here, measure(topology(), curved), bending());
     if (curved_energy < straight_energy || !std::isfinite(straight_energy)) return curved;
   }
   return std::isfinite(straight_energy) ? straight : current;
 }
 
 Solved<Vertices> GeodesicCalculus::extrapolate(const Vertices& previous, const Vertices& current,
-                                               const GeodesicOptions& options) const {
-  return solveForDeformed(*structure_, bending_, previous, current, predict(previous, current), options);
+                                               const GeodesicOptions& options, const Vertices& near) const {
+  const Vertices start = near.rows() > 0 ? aligned(near, current) : predict(previous, current);
+  return solveForDeformed(*structure_, energy_, previous, current, start, options);
 }
 
 Solved<Vertices> GeodesicCalculus::extrapolateBackwards(const Vertices& current, const Vertices& next,
                                                         const GeodesicOptions& options) const {
-  return solveForUndeformed(*structure_, bending_, current, next, predict(next, current), options);
+  return solveForUndeformed(*structure_, energy_, current, next, predict(next, current), options);
 }
 
 Solved<Vertices> GeodesicCalculus::at(const Path& path, double t, const GeodesicOptions& options) const {

@@ -5,6 +5,7 @@
 
 #include "core/geodesic/length_angle.h"
 #include "core/numerics/solved.h"
+#include "core/shell/pair_energy.h"
 #include "core/shell/structure.h"
 
 namespace shaped {
@@ -22,12 +23,13 @@ struct GeodesicOptions {
 /// Const and safe to share between threads; symbolic work is done once.
 class GeodesicCalculus {
  public:
-  /// bending: eta [m^2], > 0.
-  GeodesicCalculus(ShellStructurePtr structure, double bending);
+  GeodesicCalculus(ShellStructurePtr structure, const PairEnergy& energy);
 
   const ShellStructurePtr& structure() const { return structure_; }
   const Topology& topology() const { return structure_->topology(); }
-  double bending() const { return bending_; }
+  /// What stands for W in the comments below.
+  const PairEnergy& energy() const { return energy_; }
+  double bending() const { return energy_.bending(); }
 
   /// The discrete K-geodesic from a to b, the minimiser of the path energy (7): K + 1 shapes, the ends as given, K
   /// >= 1. warm: a path with the same number of shapes whose inner ones start the iteration, or empty. Throws
@@ -36,8 +38,9 @@ class GeodesicCalculus {
                            const Path& warm = {}) const;
 
   /// The shape after `current` on the discrete geodesic that runs through `previous`: W,2[previous, current] +
-  /// W,1[current, next] = 0, equation (23).
-  Solved<Vertices> extrapolate(const Vertices& previous, const Vertices& current, const GeodesicOptions& options) const;
+  /// W,1[current, next] = 0, equation (23). near: a shape like the next one, or empty.
+  Solved<Vertices> extrapolate(const Vertices& previous, const Vertices& current, const GeodesicOptions& options,
+                               const Vertices& near = {}) const;
 
   /// The shape before `current` where `next` follows: W,2[previous, current] + W,1[current, next] = 0.
   Solved<Vertices> extrapolateBackwards(const Vertices& current, const Vertices& next,
@@ -73,7 +76,7 @@ class GeodesicCalculus {
   Vertices predict(const Vertices& previous, const Vertices& current) const;
 
   ShellStructurePtr structure_;
-  double bending_;
+  PairEnergy energy_;
   std::shared_ptr<const LengthAngleReconstruction> reconstruction_;
 };
 

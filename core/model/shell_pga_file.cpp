@@ -6,6 +6,7 @@ namespace shaped {
 namespace {
 
 constexpr int kFormatVersion = 1;
+constexpr const char *kSymmetricName = "symmetric", *kDirectedName = "directed";
 
 nlohmann::json toJson(const Outcome& outcome) {
   return {{"termination", name(outcome.termination)}, {"iterations", outcome.iterations}, {"residual", outcome.residual}};
@@ -20,6 +21,14 @@ Outcome outcomeFrom(const nlohmann::json& json) {
   outcome.iterations = json.at("iterations").get<int>();
   outcome.residual = json.at("residual").get<double>();
   return outcome;
+}
+
+/// Models from before there was a choice are directed.
+EnergySymmetry symmetryFrom(const nlohmann::json& description) {
+  const auto text = description.value("path_energy", kDirectedName);
+  if (text == kSymmetricName) return EnergySymmetry::kSymmetric;
+  if (text == kDirectedName) return EnergySymmetry::kDirected;
+  throw InvalidInput("path_energy", "is \"" + text + "\", want " + kSymmetricName + " or " + kDirectedName);
 }
 
 void addSparse(TensorWriter& tensors, const std::string& name, const SparseRows& matrix) {
@@ -92,6 +101,7 @@ ShellPgaParts partsFrom(const StoredModel& stored) {
   const auto coarse_vertices = static_cast<Eigen::Index>(kept.size());
   parts.detail = sparseFrom(tensors, "detail", vertex_count, 2 * coarse_vertices);
   parts.bending = description.at("bending").get<double>();
+  parts.symmetry = symmetryFrom(description);
   parts.pga = pgaFrom(tensors, description.at("path_steps").get<int>(), coarse_vertices);
   parts.training.shapes = description.at("training_shapes").get<int>();
   parts.training.mean = outcomeFrom(description.at("training").at("mean"));
@@ -129,6 +139,7 @@ std::int64_t publishShellPga(const ModelDirectory& directory, const std::string&
                           {"modes", model.modes()},
                           {"path_steps", parts.pga.path_steps},
                           {"bending", parts.bending},
+                          {"path_energy", parts.symmetry == EnergySymmetry::kSymmetric ? kSymmetricName : kDirectedName},
                           {"training_shapes", parts.training.shapes},
                           {"training",
                            {{"mean", toJson(parts.training.mean)},

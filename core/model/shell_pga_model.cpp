@@ -10,7 +10,8 @@ namespace shaped {
 namespace {
 
 std::shared_ptr<const Submanifold> makeSubmanifold(const ShellPgaParts& parts) {
-  auto calculus = std::make_shared<GeodesicCalculus>(std::make_shared<ShellStructure>(parts.coarsening.coarse), parts.bending);
+  auto calculus = std::make_shared<GeodesicCalculus>(std::make_shared<ShellStructure>(parts.coarsening.coarse),
+                                                     PairEnergy(parts.bending, parts.symmetry));
   return std::make_shared<Submanifold>(std::move(calculus), std::make_shared<ShellPga>(parts.pga));
 }
 

@@ -30,6 +30,7 @@ struct ShellPgaParts {
   Vertices reference;        ///< full resolution; prolongation carries its detail
   SparseRows detail;         ///< learned correction of the prolongation, V x 2C
   double bending = 0;        ///< eta [m^2]
+  EnergySymmetry symmetry = EnergySymmetry::kSymmetric;  ///< of the squared distance in paths, mean and Gram matrix
   ShellPga pga;              ///< on the coarse mesh
   TrainingRecord training;
 };

@@ -71,6 +71,7 @@ Solved<ShellPgaModelPtr> trainShellPga(const ShellPgaTrainingSet& set, const She
   ShellPgaParts parts;
   parts.topology = set.topology;
   parts.template_shape = set.template_shape.value_or(set.shapes.front());
+  parts.symmetry = options.symmetry;
   parts.bending = options.bending.value_or(defaultBending(set.shapes.front()));
   parts.coarsening = coarsen(set.topology, set.shapes, {options.coarse_vertices, {}, stop});
   const Outcome cancelled{Termination::kCancelled, 0, 0};
@@ -82,7 +83,8 @@ Solved<ShellPgaModelPtr> trainShellPga(const ShellPgaTrainingSet& set, const She
   }
   requireDistinct(coarse);
 
-  const GeodesicCalculus calculus(std::make_shared<ShellStructure>(parts.coarsening.coarse), parts.bending);
+  const GeodesicCalculus calculus(std::make_shared<ShellStructure>(parts.coarsening.coarse),
+                                  {parts.bending, parts.symmetry});
   const auto spider = frechetMean(calculus, coarse, {options.path_steps, options.iterations, options.tolerance, stop,
                                                      within(progress, 0.1, 0.75)});
   parts.training = {static_cast<int>(set.shapes.size()), spider, {}, 0};

@@ -94,6 +94,22 @@ void GeneralBlockMatrix::multiplyTransposedAdd(double scale, const double* x, do
   }
 }
 
+void GeneralBlockMatrix::addTransposed(const GeneralBlockMatrix& other) {
+  // A column is read along the rows of the other matrix. Rows are visited in order, so a cursor per column finds each
+  // block without a search.
+  std::vector<std::int32_t> cursor(static_cast<std::size_t>(pattern_->nodeCount()));
+  for (std::int32_t column = 0; column < pattern_->nodeCount(); ++column)
+    cursor[static_cast<std::size_t>(column)] = pattern_->begin(column);
+  std::int32_t slot = 0;
+  for (std::int32_t column = 0; column < pattern_->nodeCount(); ++column)
+    for (const auto row : pattern_->rows(column)) {
+      const double* source = other.block(slot++);
+      double* target = block(cursor[static_cast<std::size_t>(row)]++);
+      for (int r = 0; r < 3; ++r)
+        for (int c = 0; c < 3; ++c) target[3 * r + c] += source[3 * c + r];
+    }
+}
+
 Eigen::SparseMatrix<double> GeneralBlockMatrix::toSparse() const {
   Triplets triplets;
   std::int32_t slot = 0;

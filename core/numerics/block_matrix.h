@@ -41,6 +41,8 @@ class GeneralBlockMatrix {
   void multiplyAdd(double scale, const double* x, double* y) const;
   /// y += scale A^T x.
   void multiplyTransposedAdd(double scale, const double* x, double* y) const;
+  /// This += other^T; the pattern must be the same.
+  void addTransposed(const GeneralBlockMatrix& other);
   Eigen::SparseMatrix<double> toSparse() const;
 
  private:

@@ -131,7 +131,7 @@ Solved<Spider> frechetMean(const GeodesicCalculus& calculus, const std::vector<V
       const double fraction = 1 - 0.7 * std::pow(0.85, iteration);
       options.progress({"Frechet mean, Newton step " + std::to_string(iteration), fraction, residual});
     };
-  auto relaxed = relax(calculus.structure(), calculus.bending(), buildSpider(start.mean, std::move(start.arms), steps),
+  auto relaxed = relax(calculus.structure(), calculus.energy(), buildSpider(start.mean, std::move(start.arms), steps),
                        network_options);
   Spider spider;
   spider.mean = relaxed.solution.nodes.front();

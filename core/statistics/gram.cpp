@@ -20,7 +20,7 @@ Eigen::MatrixXd gramMatrix(const GeodesicCalculus& calculus, const Spider& spide
   Eigen::MatrixXd cross(n, n);  // W[s_1^i, s_1^j]
   tbb::parallel_for(Eigen::Index{0}, n, [&](Eigen::Index i) {
     const auto& node = nodes[static_cast<std::size_t>(i)];
-    own[i] = shellEnergy(topology, mean, node, calculus.bending());
+    own[i] = calculus.energy().value(topology, mean, node);
     for (Eigen::Index j = 0; j < n; ++j)
       cross(i, j) = i == j ? 0 : shellEnergy(topology, node, nodes[static_cast<std::size_t>(j)], calculus.bending());
   });

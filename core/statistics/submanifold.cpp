@@ -15,10 +15,6 @@ GeodesicOptions geodesicOptions(const SubmanifoldOptions& options) {
   return {100, options.shape_tolerance, options.stop};
 }
 
-double shellDistance(const Topology& topology, const ShellMeasures& a, const ShellMeasures& b, double bending) {
-  return std::sqrt(std::max(shellEnergy(topology, a, b, bending), 0.0));
-}
-
 /// W,2[undeformed, deformed] with the pinned unknowns cleared.
 Eigen::VectorXd secondForce(const GeodesicCalculus& calculus, const ShellMeasures& undeformed, const Vertices& deformed,
                             const ShellMeasures& deformed_measures, const Pins& pins) {
@@ -29,6 +25,13 @@ Eigen::VectorXd secondForce(const GeodesicCalculus& calculus, const ShellMeasure
   Eigen::VectorXd result = flatten(force);
   pins.clear(result.data());
   return result;
+}
+
+/// Where the next shape after `here` lies if it moved away from near[k + 1] as `here` did from near[k].
+Vertices follow(const Path& near, std::size_t k, const Vertices& here) {
+  if (near.empty()) return {};
+  const auto motion = alignRigidly(near[k], here);
+  return apply(motion, near[k + 1]) + here - apply(motion, near[k]);
 }
 
 }  // namespace
@@ -43,7 +46,7 @@ Submanifold::Submanifold(std::shared_ptr<const GeodesicCalculus> calculus, std::
     measures_.push_back(measure(calculus_->topology(), variation));
     forces_[index] = secondForce(*calculus_, measures_.back(), pga_->mean, mean, pins).norm() + floor;
     if (index < pga_->modes())
-      distances_[index] = shellDistance(calculus_->topology(), mean, measures_.back(), calculus_->bending());
+      distances_[index] = std::sqrt(std::max(calculus_->energy().value(calculus_->topology(), mean, measures_.back()), 0.0));
   }
 }
 
@@ -207,19 +210,21 @@ Solved<SubmanifoldProjection> Submanifold::project(const Vertices& shape, const 
                                        result.local, result.local_energy);
   outcome += weights;
   result.point.alpha = weights.solution.alpha;
-  auto scaled = rescale(result.local, result.point.scale, path.solution[1], options);
+  auto scaled = rescale(result.local, result.point.scale, warm && !warm->nodes.empty() ? warm->nodes : path.solution, options);
   outcome += scaled;
-  result.shape = std::move(scaled.solution);
+  result.nodes = std::move(scaled.solution);
+  result.shape = result.nodes.back();
   result.geodesic = std::move(path.solution);
   return {std::move(result), outcome};
 }
 
-Solved<Vertices> Submanifold::rescale(const Vertices& local, double scale, const Vertices& first_node,
-                                      const SubmanifoldOptions& options) const {
+Solved<Path> Submanifold::rescale(const Vertices& local, double scale, const Path& near,
+                                  const SubmanifoldOptions& options) const {
   // Far from the mean (23) may have no solution for steps as long as a K-th of the way; then shorter ones.
   int spent = 0;
   for (int steps = pga_->path_steps;; steps *= 2) {
-    auto marched = march(local, scale, steps, steps == pga_->path_steps ? first_node : Vertices(), options);
+    const bool same_steps = near.size() == static_cast<std::size_t>(steps) + 1;
+    auto marched = march(local, scale, steps, same_steps ? near : Path(), options);
     spent += marched.iterations;
     if (marched.converged() || marched.termination == Termination::kCancelled || scale * steps > 1) {
       marched.iterations = spent;
@@ -228,23 +233,25 @@ Solved<Vertices> Submanifold::rescale(const Vertices& local, double scale, const
   }
 }
 
-Solved<Vertices> Submanifold::march(const Vertices& local, double scale, int steps, const Vertices& first_node,
-                                    const SubmanifoldOptions& options) const {
+Solved<Path> Submanifold::march(const Vertices& local, double scale, int steps, const Path& near,
+                                const SubmanifoldOptions& options) const {
   // The exact inverse of the scaling: local lies at rho times the steps on the first segment of a geodesic from the
   // mean, whose first node follows from (24) and the others by (23). So a shape whose local one is on the submanifold
   // comes back.
   const auto geodesic_options = geodesicOptions(options);
-  if (scale * steps > 1) return calculus_->at({pga_->mean, local}, 1 / scale, geodesic_options);
-  auto first = calculus_->through(pga_->mean, local, scale * steps, geodesic_options, first_node);
-  Outcome outcome = first;
-  Vertices here = std::move(first.solution), before = pga_->mean;
-  for (int k = 1; k < steps && outcome.converged(); ++k) {
-    auto next = calculus_->extrapolate(before, here, geodesic_options);
-    outcome += next;
-    before = std::move(here);
-    here = std::move(next.solution);
+  if (scale * steps > 1) {
+    auto end = calculus_->at({pga_->mean, local}, 1 / scale, geodesic_options);
+    return {Path{pga_->mean, std::move(end.solution)}, end};
   }
-  return {std::move(here), outcome};
+  auto first = calculus_->through(pga_->mean, local, scale * steps, geodesic_options, near.empty() ? Vertices() : near[1]);
+  Outcome outcome = first;
+  Path nodes{pga_->mean, std::move(first.solution)};
+  for (std::size_t k = 1; k < static_cast<std::size_t>(steps) && outcome.converged(); ++k) {
+    auto next = calculus_->extrapolate(nodes[k - 1], nodes[k], geodesic_options, follow(near, k, nodes[k]));
+    outcome += next;
+    nodes.push_back(std::move(next.solution));
+  }
+  return {std::move(nodes), outcome};
 }
 
 Solved<Vertices> Submanifold::shapeOf(const SubmanifoldPoint& point, const SubmanifoldOptions& options,
@@ -258,10 +265,10 @@ Solved<Vertices> Submanifold::shapeOf(const SubmanifoldPoint& point, const Subma
     throw InvalidInput("alpha", "sums to " + std::to_string(point.alpha.sum()) + ", want 1");
   if (!(point.scale > 0) || !std::isfinite(point.scale)) throw InvalidInput("scale", "must be a positive number");
   const auto local = average(point.alpha, warm ? warm->local : pga_->mean, options);
-  auto scaled = rescale(local.solution, point.scale, warm && warm->geodesic.size() > 1 ? warm->geodesic[1] : Vertices(), options);
+  auto scaled = rescale(local.solution, point.scale, warm ? warm->nodes : Path(), options);
   Outcome outcome = local;
   outcome += scaled;
-  return {std::move(scaled.solution), outcome};
+  return {std::move(scaled.solution.back()), outcome};
 }
 
 Eigen::VectorXd Submanifold::tangentCoordinates(const SubmanifoldPoint& point) const {

@@ -16,6 +16,7 @@ struct SubmanifoldProjection {
   Vertices shape;       ///< P[s] (20), in no particular position
   Vertices local;       ///< P_loc[s_loc] (18)
   Path geodesic;        ///< from the mean to s
+  Path nodes;           ///< from the mean to P[s]: the shapes that rescaling (20) passes through
   double local_energy;  ///< W[s_loc, P_loc[s_loc]] [m^2]
 };
 
@@ -66,17 +67,16 @@ class Submanifold {
   Solved<SubmanifoldPoint> optimiseWeights(const ShellMeasures& target, const std::vector<std::size_t>& vertices,
                                            Eigen::VectorXd start, const SubmanifoldOptions& options, Vertices& q,
                                            double& energy) const;
-  /// I(mean, local, 1 / scale) in K steps, or more where K do not get there. first_node: a guess of the first node 1/K
-  /// along the way, or empty.
-  Solved<Vertices> rescale(const Vertices& local, double scale, const Vertices& first_node,
-                           const SubmanifoldOptions& options) const;
-  Solved<Vertices> march(const Vertices& local, double scale, int steps, const Vertices& first_node,
-                         const SubmanifoldOptions& options) const;
+  /// I(mean, local, 1 / scale) in K steps, or more where K do not get there: the shapes from the mean to there. near: the
+  /// same for a similar shape, or empty.
+  Solved<Path> rescale(const Vertices& local, double scale, const Path& near, const SubmanifoldOptions& options) const;
+  Solved<Path> march(const Vertices& local, double scale, int steps, const Path& near,
+                     const SubmanifoldOptions& options) const;
 
   std::shared_ptr<const GeodesicCalculus> calculus_;
   std::shared_ptr<const ShellPga> pga_;
   std::vector<ShellMeasures> measures_;  ///< of the variations
-  Eigen::VectorXd distances_;            ///< sqrt(W[mean, p_j]), J entries [m]
+  Eigen::VectorXd distances_;            ///< dist(mean, p_j), one segment each, J entries [m]
   Eigen::VectorXd forces_;               ///< |W,2[p_j, mean]|, 2J entries: reference for balances
 };
 

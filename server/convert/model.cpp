@@ -7,6 +7,10 @@
 namespace shaped::server {
 namespace {
 
+v1::PathEnergy pathEnergyOf(bool symmetric) {
+  return symmetric ? v1::PATH_ENERGY_SYMMETRIC : v1::PATH_ENERGY_DIRECTED;
+}
+
 void setIdentity(const std::string& name, std::uint64_t version, const ModelManifest& manifest,
                  v1::ModelDescription& description) {
   description.mutable_model()->set_name(name);
@@ -31,6 +35,7 @@ void toProto(const ModelStore::Entry& entry, v1::ModelDescription& description) 
   pga.set_path_steps(json.value("path_steps", 0U));
   pga.set_coarse_vertices(json.value("coarse_vertices", 0U));
   pga.set_bending(json.value("bending", 0.0));
+  pga.set_path_energy(pathEnergyOf(json.value("path_energy", "") == "symmetric"));
 }
 
 void toProto(const ServedModel& model, v1::ModelDescription& description) {
@@ -46,6 +51,7 @@ void toProto(const ServedModel& model, v1::ModelDescription& description) {
   pga.set_path_steps(static_cast<std::uint32_t>(parts.pga.path_steps));
   pga.set_coarse_vertices(static_cast<std::uint32_t>(parts.coarsening.coarse->vertexCount()));
   pga.set_bending(parts.bending);
+  pga.set_path_energy(pathEnergyOf(parts.symmetry == EnergySymmetry::kSymmetric));
   for (const double value : parts.pga.eigenvalues) pga.add_eigenvalues(value);
 }
 

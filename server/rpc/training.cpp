@@ -33,6 +33,9 @@ ShellPgaTrainingOptions optionsFrom(const v1::ShellPgaTraining& message, const D
   if (message.iterations() != 0)
     options.iterations = countFromProto(message.iterations(), kAnyCount, "shell_pga.iterations");
   if (message.bending() != 0) options.bending = message.bending();
+  if (!v1::PathEnergy_IsValid(message.path_energy()))
+    throw InvalidInput("shell_pga.path_energy", std::to_string(message.path_energy()) + " is no PathEnergy");
+  if (message.path_energy() == v1::PATH_ENERGY_DIRECTED) options.symmetry = EnergySymmetry::kDirected;
   if (message.tolerance() != 0) options.tolerance = message.tolerance();
   if (const auto violation = options.firstViolation(shapes)) throw InvalidInput("shell_pga", *violation);
   return options;

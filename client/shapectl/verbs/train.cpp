@@ -12,7 +12,7 @@ struct Train {
   std::vector<std::string> meshes;
   std::int64_t modes = 0, path_steps = 0, coarse_vertices = 0;
   double bending = 0;
-  bool publish_unconverged = false;
+  bool publish_unconverged = false, directed = false;
 
   void declare(Arguments& arguments) {
     arguments.positional("METHOD", method, "shell-pga");
@@ -24,6 +24,7 @@ struct Train {
     arguments.option("--path-steps", path_steps, "K", "Steps of each discrete geodesic (4)");
     arguments.option("--bending", bending, "ETA", "Bending weight [m^2] (2.5e-5 times the squared diameter)");
     arguments.option("--coarse-vertices", coarse_vertices, "N", "Solve on a mesh of at most so many vertices (1000)");
+    arguments.flag("--directed", directed, "Let distances count one direction of the energy, as in the paper (both)");
     arguments.flag("--publish-unconverged", publish_unconverged, "Publish the model even if it did not converge");
   }
 
@@ -67,6 +68,7 @@ struct Train {
     options.set_path_steps(countOf("--path-steps", path_steps));
     options.set_coarse_vertices(countOf("--coarse-vertices", coarse_vertices));
     options.set_bending(bending);
+    if (directed) options.set_path_energy(v1::PATH_ENERGY_DIRECTED);
     client::Call call(session.callOptions());
     v1::TrainResponse response;
     client::require(jobs.Train(call.context(), request, &response));

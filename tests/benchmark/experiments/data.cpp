@@ -85,8 +85,8 @@ DataSet subset(const DataSet& set, const std::vector<std::size_t>& indices) {
 
 GeodesicCalculus calculusOf(const DataSet& set) { return calculusOf(set, defaultBending(set.shapes.front())); }
 
-GeodesicCalculus calculusOf(const DataSet& set, double bending) {
-  return {std::make_shared<ShellStructure>(set.topology), bending};
+GeodesicCalculus calculusOf(const DataSet& set, const PairEnergy& energy) {
+  return {std::make_shared<ShellStructure>(set.topology), energy};
 }
 
 }  // namespace shaped::experiments

@@ -40,6 +40,6 @@ DataSet subset(const DataSet& set, const std::vector<std::size_t>& indices);
 
 /// Geodesic calculus on the set's mesh with the default bending weight of its first shape.
 GeodesicCalculus calculusOf(const DataSet& set);
-GeodesicCalculus calculusOf(const DataSet& set, double bending);
+GeodesicCalculus calculusOf(const DataSet& set, const PairEnergy& energy);
 
 }  // namespace shaped::experiments

@@ -92,3 +92,20 @@ TEST_CASE("a block matrix set to zero forgets its values and keeps its pattern")
   CHECK(all.toSparse().norm() == 0);
   CHECK(all.toSparse().nonZeros() == 9 * pattern->blockCount());
 }
+
+TEST_CASE("a block matrix takes up another one transposed") {
+  const auto pattern = std::make_shared<const BlockPattern>(kNodes, kStencils);
+  std::mt19937 random(5);
+  std::normal_distribution<double> normal;
+  const auto filled = [&] {
+    GeneralBlockMatrix matrix(pattern);
+    for (std::int32_t slot = 0; slot < pattern->blockCount(); ++slot)
+      for (int i = 0; i < 9; ++i) matrix.block(slot)[i] = normal(random);
+    return matrix;
+  };
+  auto sum = filled();
+  const auto other = filled();
+  const Eigen::MatrixXd expected = Eigen::MatrixXd(sum.toSparse()) + Eigen::MatrixXd(other.toSparse()).transpose();
+  sum.addTransposed(other);
+  CHECK((Eigen::MatrixXd(sum.toSparse()) - expected).norm() < 1e-14);
+}

@@ -225,7 +225,7 @@ TEST_CASE("every vertex of the polyhedron is its own projection") {
   for (Eigen::Index j = 0; j < 8; ++j) {
     const SubmanifoldPoint corner{Eigen::VectorXd::Unit(8, j), 1};
     const auto& variation = model.pga->variations[static_cast<std::size_t>(j)];
-    CHECK(rigidGap(model.shapeOf(corner), variation) < 1e-9);
+    CHECK(rigidGap(model.shapeOf(corner), variation) < 1e-8);
     const auto projection = model.project(variation);
     INFO("variation " << j);
     CHECK(model.relativeGap(projection.shape, variation) < 0.03);
