@@ -4,6 +4,10 @@
 
 namespace shaped::shapectl {
 
+std::string pathEnergyText(v1::PathEnergy energy) {
+  return energy == v1::PATH_ENERGY_DIRECTED ? "directed" : "symmetric";
+}
+
 nlohmann::json toJson(const v1::ModelDescription& description) {
   nlohmann::json document{{"kind", description.kind()},
                           {"topology_id", description.topology_id()},
@@ -16,7 +20,8 @@ nlohmann::json toJson(const v1::ModelDescription& description) {
   const auto& pga = description.shell_pga();
   document["shell_pga"] = {
       {"training_shapes", pga.training_shapes()}, {"modes", pga.modes()},     {"path_steps", pga.path_steps()},
-      {"coarse_vertices", pga.coarse_vertices()}, {"bending", pga.bending()}, {"eigenvalues", pga.eigenvalues()}};
+      {"coarse_vertices", pga.coarse_vertices()}, {"bending", pga.bending()},
+      {"path_energy", pathEnergyText(pga.path_energy())}, {"eigenvalues", pga.eigenvalues()}};
   return document;
 }
 

@@ -75,7 +75,7 @@ void HandleEditor::place() {
   const auto& pga = submanifold_.pga();
   state_.shape = apply(alignRigidly(anchorPositions(calculus_.topology(), handles_, pga.mean), wanted_), pga.mean);
   state_.projection.point = submanifold_.pointOf(Eigen::VectorXd::Zero(pga.modes()));
-  state_.projection.shape = state_.projection.local = state_.shape;
+  state_.projection.shape = state_.projection.realised.local = state_.shape;
   shifted_ = handles_;
   for (auto& handle : shifted_) handle.weight = 100;
 }
@@ -143,9 +143,9 @@ void HandleEditor::chooseStart(const Start& last, Outcome& outcome) {
   start_ = plainStart();
   const auto point = accelerator_.propose();
   if (!point) return;
-  auto ahead = submanifold_.shapeOf(*point, options_.submanifold, &state_.projection);
+  auto ahead = submanifold_.shapeOf(*point, options_.submanifold, &state_.projection.realised);
   outcome.iterations += ahead.iterations;
-  if (ahead.converged()) start_ = {*point, std::move(ahead.solution), true};
+  if (ahead.converged()) start_ = {*point, ahead.solution.shape(), true};
 }
 
 Outcome HandleEditor::alternate() {

@@ -1,5 +1,6 @@
 #include "core/mocap/marker_tracker.h"
 
+#include <algorithm>
 #include <cmath>
 
 #include "core/mesh/alignment.h"
@@ -16,6 +17,12 @@ Eigen::VectorXd weightsOf(const std::vector<AnchorTarget>& targets) {
   Eigen::VectorXd weights(static_cast<Eigen::Index>(targets.size()));
   for (std::size_t l = 0; l < targets.size(); ++l) weights[static_cast<Eigen::Index>(l)] = targets[l].weight;
   return weights;
+}
+
+double median(std::vector<double> values) {
+  const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
+  std::nth_element(values.begin(), middle, values.end());
+  return *middle;
 }
 
 }  // namespace
@@ -74,27 +81,79 @@ void MarkerTracker::takeMarkers(const MarkerPositions& markers) {
 /// Moves the shape by the rigid motion that brings its marker points to the markers.
 void MarkerTracker::followRigidly() { shape_ = apply(alignRigidly(modelPoints(shape_), markers_, weightsOf(targets_)), shape_); }
 
-/// Geman-McClure weights (c^2 / (c^2 + r^2))^2 of the current residuals.
-void MarkerTracker::updateWeights() {
+/// Geman-McClure weights (c^2 / (c^2 + r^2))^2 of the current residuals, c the distance.
+void MarkerTracker::updateWeights(double distance) {
   if (options_.robust_scale == 0) return;
-  const double c = options_.robust_scale * size_;
   const Vertices points = modelPoints(shape_);
   for (std::size_t l = 0; l < targets_.size(); ++l) {
     if (!seen(targets_[l])) continue;
     const auto row = static_cast<Eigen::Index>(l);
-    const double ratio = c * c / (c * c + (points.row(row) - markers_.row(row)).squaredNorm());
-    targets_[l].weight = ratio * ratio;
+    const double squared = distance * distance;
+    const double ratio = squared / (squared + (points.row(row) - markers_.row(row)).squaredNorm());
+    // a weight of zero would mean a marker that was not seen
+    targets_[l].weight = std::max(ratio * ratio, 1e-12);
   }
+}
+
+double MarkerTracker::medianResidual() const {
+  const Vertices points = modelPoints(shape_);
+  std::vector<double> residuals;
+  for (std::size_t l = 0; l < targets_.size(); ++l)
+    if (seen(targets_[l]))
+      residuals.push_back((points.row(static_cast<Eigen::Index>(l)) - markers_.row(static_cast<Eigen::Index>(l))).norm());
+  return median(std::move(residuals));
+}
+
+/// For residuals that the pose may still cause.
+double MarkerTracker::tolerantDistance() const { return std::max(robustDistance(), 3 * medianResidual()); }
+
+/// Brings the mean to the markers. Reweighted until outliers no longer pull: a single gross one would turn and shrink the
+/// model beyond what the rounds that follow could mend.
+void MarkerTracker::place(bool estimate_scale) {
+  shape_ = prior_ = submanifold_->pga().mean;
+  projection_ = {};
+  if (estimate_scale && !options_.scale) {
+    rescale(neighbourRatio());
+    shape_ = prior_;
+  }
+  for (int round = 0; round < (options_.robust_scale == 0 ? 1 : 20); ++round) {
+    followRigidly();
+    updateWeights(tolerantDistance());
+  }
+}
+
+/// Median ratio of the distances between neighbouring markers to those between their points on the shape. Neighbours sit
+/// mostly on one part of the body, so neither the pose nor a few outliers change it.
+double MarkerTracker::neighbourRatio() const {
+  constexpr std::size_t neighbours = 5;
+  const Vertices points = modelPoints(shape_);
+  std::vector<double> ratios;
+  for (std::size_t l = 0; l < targets_.size(); ++l) {
+    const auto row = static_cast<Eigen::Index>(l);
+    std::vector<std::pair<double, double>> distances;  // on the shape, among the markers
+    for (std::size_t m = 0; m < targets_.size(); ++m) {
+      const auto other = static_cast<Eigen::Index>(m);
+      if (m == l || !seen(targets_[l]) || !seen(targets_[m])) continue;
+      distances.emplace_back((points.row(row) - points.row(other)).norm(), (markers_.row(row) - markers_.row(other)).norm());
+    }
+    std::sort(distances.begin(), distances.end());
+    for (std::size_t k = 0; k < std::min(neighbours, distances.size()); ++k)
+      ratios.push_back(distances[k].second / distances[k].first);
+  }
+  return median(std::move(ratios));
 }
 
 /// The size of the subject: of the markers against their points on the projection, which the markers do not stretch.
 void MarkerTracker::updateScale() {
   if (options_.scale) return;
   const auto motion = alignSimilarly(modelPoints(prior_), markers_, weightsOf(targets_));
-  if (!(motion.scale > 0.1 && motion.scale < 10)) return;
-  scale_ *= motion.scale;
-  shape_ /= motion.scale;
-  markers_ /= motion.scale;
+  if (motion.scale > 0.1 && motion.scale < 10) rescale(motion.scale);
+}
+
+void MarkerTracker::rescale(double ratio) {
+  scale_ *= ratio;
+  shape_ /= ratio;
+  markers_ /= ratio;
 }
 
 /// min over s for fixed P[s]; offsets keep the direction they have on the shape at hand.
@@ -118,10 +177,7 @@ Outcome MarkerTracker::projectShape() {
 
 /// From the mean, placed by the markers: rounds of shape and projection until W[s, P[s]] settles.
 Outcome MarkerTracker::alternate(bool estimate_scale) {
-  shape_ = prior_ = submanifold_->pga().mean;
-  projection_ = {};
-  if (estimate_scale) updateScale();
-  followRigidly();
+  place(estimate_scale);
   Outcome outcome;
   double last_energy = std::numeric_limits<double>::infinity();
   const auto& calculus = submanifold_->calculus();
@@ -131,7 +187,7 @@ Outcome MarkerTracker::alternate(bool estimate_scale) {
     outcome += projectShape();
     if (!outcome.converged()) return outcome;
     if (estimate_scale) updateScale();
-    updateWeights();
+    updateWeights(tolerantDistance());
     const double energy = shellEnergy(calculus.topology(), shape_, prior_, calculus.bending());
     if (round > 2 && energy > 0.98 * last_energy) break;
     last_energy = energy;
@@ -150,11 +206,13 @@ Outcome MarkerTracker::firstFrame() {
 
 Outcome MarkerTracker::nextFrame() {
   followRigidly();
-  // every marker counts before outliers are judged: a fast motion must not look like a frame of outliers
+  // judged by the median before the shape has followed: a fast motion must not look like a frame of outliers
+  updateWeights(tolerantDistance());
+  followRigidly();
   Outcome outcome = fitShape();
   for (int round = 0; round < options_.alternations && outcome.termination != Termination::kCancelled; ++round) {
     outcome += projectShape();
-    updateWeights();
+    updateWeights(robustDistance());
     outcome += fitShape();
   }
   if (outcome.converged() || outcome.termination == Termination::kCancelled) return outcome;

@@ -48,7 +48,9 @@ struct MarkerFit {
 };
 
 /// Fits a sequence of marker frames by the alternating scheme for (22) of [HZRS18]: s for fixed P[s], then P[s]; each
-/// frame starts from the last one. The first frame is placed and scaled by a similarity of the mean's marker points.
+/// frame starts from the last one. The first frame is placed and scaled by a robust similarity of the mean's marker points.
+/// While a shape has yet to follow its markers, they are judged outliers at three times their median residual; after that
+/// at the robust scale.
 ///
 /// Keeps the state of one sequence; one object per sequence and thread.
 class MarkerTracker {
@@ -66,8 +68,14 @@ class MarkerTracker {
   Vertices modelPoints(const Vertices& shape) const;
   Eigen::Vector3d offsetOn(const Vertices& shape, const MarkerSite& site) const;
   void followRigidly();
-  void updateWeights();
+  double robustDistance() const { return options_.robust_scale * size_; }
+  void updateWeights(double distance);
+  double medianResidual() const;
+  double tolerantDistance() const;
+  void place(bool estimate_scale);
   void updateScale();
+  void rescale(double ratio);
+  double neighbourRatio() const;
   Outcome fitShape();
   Outcome projectShape();
   Outcome alternate(bool estimate_scale);

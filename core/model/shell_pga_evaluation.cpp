@@ -113,7 +113,7 @@ double specificity(const ShellPgaModel& model, const std::vector<Vertices>& shap
     for (int j = 0; j < modes; ++j) y[j] = normal(random) * std::sqrt(std::max(model.pga().eigenvalues[j], 0.0));
     SubmanifoldOptions submanifold_options;
     submanifold_options.stop = options.stop;
-    const auto shape = model.submanifold().shapeOf(model.submanifold().pointOf(y), submanifold_options).solution;
+    const auto shape = model.submanifold().shapeOf(model.submanifold().pointOf(y), submanifold_options).solution.shape();
     const auto measures = measure(calculus.topology(), shape);
     double nearest = std::numeric_limits<double>::infinity();
     for (const auto& known : shapes)

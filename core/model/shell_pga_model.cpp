@@ -104,8 +104,19 @@ std::vector<MarkerSite> ShellPgaModel::sitesOf(const MarkerSet& markers) const {
 }
 
 const ShellStructurePtr& ShellPgaModel::fineStructure() const {
-  std::call_once(fine_once_, [this] { fine_structure_ = std::make_shared<ShellStructure>(parts_.topology); });
+  std::call_once(fine_structure_once_, [this] { fine_structure_ = std::make_shared<ShellStructure>(parts_.topology); });
   return fine_structure_;
+}
+
+const std::shared_ptr<const Submanifold>& ShellPgaModel::fineSubmanifold() const {
+  std::call_once(fine_submanifold_once_, [this] {
+    ShellPga fine = parts_.pga;
+    fine.mean = mean_;
+    for (auto& variation : fine.variations) variation = prolongation_.prolongate(variation);
+    auto calculus = std::make_shared<GeodesicCalculus>(fineStructure(), PairEnergy(parts_.bending, parts_.symmetry));
+    fine_submanifold_ = std::make_shared<Submanifold>(std::move(calculus), std::make_shared<ShellPga>(std::move(fine)));
+  });
+  return fine_submanifold_;
 }
 
 }  // namespace shaped

@@ -63,6 +63,8 @@ class ShellPgaModel {
 
   /// Sparsity and symbolic factorisation at full resolution, made at the first call.
   const ShellStructurePtr& fineStructure() const;
+  /// The submanifold of the prolongated mean and variations at full resolution, made at the first call.
+  const std::shared_ptr<const Submanifold>& fineSubmanifold() const;
 
  private:
   Anchor anchorOfPoint(const Eigen::Vector3d& point) const;
@@ -73,8 +75,9 @@ class ShellPgaModel {
   Prolongation prolongation_;
   Vertices mean_;
   Vertices coarse_reference_, coarse_template_;
-  mutable std::once_flag fine_once_;
+  mutable std::once_flag fine_structure_once_, fine_submanifold_once_;
   mutable ShellStructurePtr fine_structure_;
+  mutable std::shared_ptr<const Submanifold> fine_submanifold_;
 };
 
 using ShellPgaModelPtr = std::shared_ptr<const ShellPgaModel>;

@@ -52,6 +52,17 @@ Solved<Vertices> finishAtFullResolution(const ShellPgaModel& model, const std::v
   return minimiseShell(objective, *structure, start, {60, 1e-6, std::move(stop)});
 }
 
+/// The shape of coefficients in the submanifold of the prolongated mean and variations, started from the prolongated
+/// coarse solution.
+Vertices solveAtFullResolution(const ShellPgaModel& model, const SubmanifoldPoint& coefficients,
+                               const SubmanifoldShape& coarse, const std::stop_token& stop, Outcome& outcome) {
+  SubmanifoldShape start{model.prolongate(coarse.local), {}};
+  for (const auto& node : coarse.nodes) start.nodes.push_back(model.prolongate(node));
+  auto solved = model.fineSubmanifold()->shapeOf(coefficients, submanifoldOptions(0, stop), &start);
+  outcome += solved;
+  return solved.solution.shape();
+}
+
 }  // namespace
 
 ShellPgaScore scoreOf(const ShellPgaModel& model, const Eigen::VectorXd& tangent_coordinates) {
@@ -76,17 +87,22 @@ Solved<ShellPgaProjection> project(const ShellPgaModel& model, const Vertices& s
   result.residual_energy = shellEnergy(model.coarseCalculus().topology(), coarse, projected, model.parts().bending);
   result.score = scoreOf(model, result.tangent_coordinates);
   result.score.residual_distance = std::sqrt(std::max(result.residual_energy, 0.0));
-  const Vertices fine = model.prolongate(projected);
+  Outcome outcome = solved;
+  const Vertices fine = options.fine ? solveAtFullResolution(model, result.coefficients, solved.solution.realised, options.stop, outcome)
+                                     : model.prolongate(projected);
   result.shape = apply(alignRigidly(fine, shape), fine);
   result.smallest_area_ratio = areaRatio(model, result.shape);
-  return {std::move(result), solved};
+  return {std::move(result), outcome};
 }
 
-Solved<SynthesizedShape> synthesize(const ShellPgaModel& model, const SubmanifoldPoint& coefficients, std::stop_token stop) {
-  const auto solved = model.submanifold().shapeOf(coefficients, submanifoldOptions(0, std::move(stop)));
-  Vertices shape = model.prolongate(solved.solution);
+Solved<SynthesizedShape> synthesize(const ShellPgaModel& model, const SubmanifoldPoint& coefficients,
+                                    const SynthesisOptions& options) {
+  const auto coarse = model.submanifold().shapeOf(coefficients, submanifoldOptions(0, options.stop));
+  Outcome outcome = coarse;
+  Vertices shape = options.fine ? solveAtFullResolution(model, coefficients, coarse.solution, options.stop, outcome)
+                                : model.prolongate(coarse.solution.shape());
   const double ratio = areaRatio(model, shape);
-  return {{std::move(shape), ratio}, solved};
+  return {{std::move(shape), ratio}, outcome};
 }
 
 Solved<ShellPgaEdit> edit(const ShellPgaModel& model, const std::vector<Handle>& handles, const EditOptions& options) {

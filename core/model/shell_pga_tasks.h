@@ -22,7 +22,8 @@ struct ShellPgaProjection {
 };
 
 struct ProjectionOptions {
-  int modes = 0;  ///< J to use, 0 = all of the model's
+  int modes = 0;      ///< J to use, 0 = all of the model's
+  bool fine = false;  ///< finish P[s] by Newton's method at full resolution instead of prolongating it
   std::stop_token stop;
 };
 
@@ -36,9 +37,15 @@ struct SynthesizedShape {
   double smallest_area_ratio = 1;
 };
 
+struct SynthesisOptions {
+  bool fine = false;  ///< finish by Newton's method at full resolution instead of prolongating the coarse shape
+  std::stop_token stop;
+};
+
 /// The full-resolution shape of coefficients. Throws InvalidInput naming "alpha", "alpha[j]" or "scale" when they are no
 /// point of the submanifold.
-Solved<SynthesizedShape> synthesize(const ShellPgaModel& model, const SubmanifoldPoint& coefficients, std::stop_token stop);
+Solved<SynthesizedShape> synthesize(const ShellPgaModel& model, const SubmanifoldPoint& coefficients,
+                                    const SynthesisOptions& options);
 
 /// The Gaussian score of tangent coordinates (J entries, J at most the model's) without the residual.
 ShellPgaScore scoreOf(const ShellPgaModel& model, const Eigen::VectorXd& tangent_coordinates);

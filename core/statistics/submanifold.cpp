@@ -205,15 +205,15 @@ Solved<SubmanifoldProjection> Submanifold::project(const Vertices& shape, const 
     start[static_cast<Eigen::Index>(j)] = warm ? warm->point.alpha[static_cast<Eigen::Index>(vertices[j])] : 1.0;
   if (!(start.sum() > 0)) start.setOnes();  // warm, but with other modes
   start /= start.sum();
-  result.local = warm ? warm->local : pga_->mean;
+  Vertices local_shape = warm ? warm->realised.local : pga_->mean;
   const auto weights = optimiseWeights(measure(calculus_->topology(), local.solution), vertices, start, options,
-                                       result.local, result.local_energy);
+                                       local_shape, result.local_energy);
   outcome += weights;
   result.point.alpha = weights.solution.alpha;
-  auto scaled = rescale(result.local, result.point.scale, warm && !warm->nodes.empty() ? warm->nodes : path.solution, options);
+  auto scaled = rescale(local_shape, result.point.scale, warm ? warm->realised.nodes : path.solution, options);
   outcome += scaled;
-  result.nodes = std::move(scaled.solution);
-  result.shape = result.nodes.back();
+  result.realised = {std::move(local_shape), std::move(scaled.solution)};
+  result.shape = result.realised.shape();
   result.geodesic = std::move(path.solution);
   return {std::move(result), outcome};
 }
@@ -254,8 +254,8 @@ Solved<Path> Submanifold::march(const Vertices& local, double scale, int steps, 
   return {std::move(nodes), outcome};
 }
 
-Solved<Vertices> Submanifold::shapeOf(const SubmanifoldPoint& point, const SubmanifoldOptions& options,
-                                      const SubmanifoldProjection* warm) const {
+Solved<SubmanifoldShape> Submanifold::shapeOf(const SubmanifoldPoint& point, const SubmanifoldOptions& options,
+                                              const SubmanifoldShape* warm) const {
   if (point.alpha.size() != forces_.size())
     throw InvalidInput(
         "alpha", "has " + std::to_string(point.alpha.size()) + " entries, want " + std::to_string(forces_.size()));
@@ -264,11 +264,11 @@ Solved<Vertices> Submanifold::shapeOf(const SubmanifoldPoint& point, const Subma
   if (!(std::abs(point.alpha.sum() - 1) < 1e-6))
     throw InvalidInput("alpha", "sums to " + std::to_string(point.alpha.sum()) + ", want 1");
   if (!(point.scale > 0) || !std::isfinite(point.scale)) throw InvalidInput("scale", "must be a positive number");
-  const auto local = average(point.alpha, warm ? warm->local : pga_->mean, options);
+  auto local = average(point.alpha, warm ? warm->local : pga_->mean, options);
   auto scaled = rescale(local.solution, point.scale, warm ? warm->nodes : Path(), options);
   Outcome outcome = local;
   outcome += scaled;
-  return {std::move(scaled.solution.back()), outcome};
+  return {{std::move(local.solution), std::move(scaled.solution)}, outcome};
 }
 
 Eigen::VectorXd Submanifold::tangentCoordinates(const SubmanifoldPoint& point) const {

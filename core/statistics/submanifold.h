@@ -10,13 +10,20 @@ struct SubmanifoldPoint {
   double scale = 1;       ///< rho of (17), > 0; a projection's is at most 1 / K
 };
 
+/// A shape of the submanifold, with what the computation of a similar one can start from.
+struct SubmanifoldShape {
+  Vertices local;  ///< q(alpha)
+  Path nodes;      ///< from the mean to the shape: what rescaling (20) passes through
+
+  const Vertices& shape() const { return nodes.back(); }
+};
+
 /// Projection of one shape, with what a similar shape's projection can start from.
 struct SubmanifoldProjection {
   SubmanifoldPoint point;
-  Vertices shape;       ///< P[s] (20), in no particular position
-  Vertices local;       ///< P_loc[s_loc] (18)
-  Path geodesic;        ///< from the mean to s
-  Path nodes;           ///< from the mean to P[s]: the shapes that rescaling (20) passes through
+  Vertices shape;             ///< P[s] (20), in no particular position
+  SubmanifoldShape realised;  ///< P_loc[s_loc] (18) and the way from the mean to P[s]
+  Path geodesic;              ///< from the mean to s
   double local_energy;  ///< W[s_loc, P_loc[s_loc]] [m^2]
 };
 
@@ -45,10 +52,10 @@ class Submanifold {
   Solved<SubmanifoldProjection> project(const Vertices& shape, const SubmanifoldOptions& options,
                                         const SubmanifoldProjection* warm = nullptr) const;
 
-  /// The shape of a point, (16). warm: the projection of a similar shape, or null. Throws InvalidInput naming "alpha" or
-  /// "scale" when the point is not one of M_J.
-  Solved<Vertices> shapeOf(const SubmanifoldPoint& point, const SubmanifoldOptions& options,
-                           const SubmanifoldProjection* warm = nullptr) const;
+  /// The shape of a point, (16): its nodes from the mean on, and the shape itself last. warm: of a similar point, or null.
+  /// Throws InvalidInput naming "alpha" or "scale" when the point is not one of M_J.
+  Solved<SubmanifoldShape> shapeOf(const SubmanifoldPoint& point, const SubmanifoldOptions& options,
+                                   const SubmanifoldShape* warm = nullptr) const;
 
   /// Coordinates in the principal components [m]: y_j = (alpha_j - alpha_-j) dist(mean, p_j) / scale, the logarithm of
   /// the point to first order. Their variance over the training shapes is the eigenvalue.

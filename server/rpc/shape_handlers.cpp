@@ -25,6 +25,7 @@ void project(ModelStore& store, const v1::ProjectRequest& request, v1::ProjectRe
   const auto& model = *served->shell_pga;
   const auto shape = shapeFromProto(request.shape(), model.topology(), "shape");
   const ProjectionOptions options{.modes = countFromProto(request.modes(), model.modes(), "modes"),
+                                  .fine = request.fine(),
                                   .stop = call.stopToken()};
   const auto solved = project(model, shape, options);
   const auto& projection = solved.solution;
@@ -40,7 +41,8 @@ void project(ModelStore& store, const v1::ProjectRequest& request, v1::ProjectRe
 void synthesize(ModelStore& store, const v1::SynthesizeRequest& request, v1::SynthesizeResponse& response, Call& call) {
   const auto served = pinModel(store, request, call);
   const auto& model = *served->shell_pga;
-  const auto solved = synthesize(model, coefficientsFromProto(request.coefficients()), call.stopToken());
+  const auto solved = synthesize(model, coefficientsFromProto(request.coefficients()),
+                                 {.fine = request.fine(), .stop = call.stopToken()});
   setAnswer(*served, solved, solved.solution.smallest_area_ratio, call, response);
   toProto(solved.solution.shape, model.topology(), *response.mutable_shape());
 }
@@ -68,7 +70,7 @@ void score(ModelStore& store, const v1::ScoreRequest& request, v1::ScoreResponse
   const auto served = pinModel(store, request, call);
   const auto& model = *served->shell_pga;
   const auto shape = shapeFromProto(request.shape(), model.topology(), "shape");
-  const auto solved = project(model, shape, ProjectionOptions{.modes = 0, .stop = call.stopToken()});
+  const auto solved = project(model, shape, ProjectionOptions{.modes = 0, .fine = false, .stop = call.stopToken()});
   setAnswer(*served, solved, solved.solution.smallest_area_ratio, call, response);
   toProto(solved.solution.score, *response.mutable_score());
 }

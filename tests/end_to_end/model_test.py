@@ -62,6 +62,29 @@ class MainJob(Trained):
         self.assertAnswer(self.expect(SUCCESS, "synthesize", "tubes", "--coefficients", weights, "-o", again).json)
         self.assertLess(rigid_distance(read_obj(again)[0], projected), 1e-4)
 
+    def test_a_shape_can_be_finished_at_full_resolution(self):
+        out, fine, again, weights = (self.folder / name for name in ("p2.obj", "f.obj", "f2.obj", "c2.json"))
+        self.expect(SUCCESS, "project", "tubes", self.unseen, "-o", out)
+        document = self.expect(SUCCESS, "project", "tubes", self.unseen, "-o", fine, "--coefficients", weights, "--fine")
+        self.assertAnswer(document.json)
+        self.expect(SUCCESS, "synthesize", "tubes", "--coefficients", weights, "-o", again, "--fine")
+        gap = rigid_distance(read_obj(fine)[0], read_obj(out)[0])
+        self.assertGreater(gap, 1e-5)  # it did something,
+        self.assertLess(gap, 0.03)  # but not much
+        self.assertLess(rigid_distance(read_obj(again)[0], read_obj(fine)[0]), 1e-4)
+
+    def test_the_energy_of_paths_can_be_chosen(self):
+        options = ("--modes", 3, "--coarse-vertices", 60)
+        self.expect(SUCCESS, "train", "shell-pga", "directed", *self.meshes, *options, "--directed")
+        values = {}
+        for name, energy in (("tubes", "symmetric"), ("directed", "directed")):
+            pga = self.expect(SUCCESS, "describe", name).json["shell_pga"]
+            self.assertEqual(pga["path_energy"], energy)
+            values[name] = pga["eigenvalues"][0]
+        difference = abs(values["tubes"] / values["directed"] - 1)
+        self.assertGreater(difference, 1e-4)
+        self.assertLess(difference, 0.2)
+
     def test_a_training_shape_is_likelier_than_a_crumpled_one(self):
         noise = numpy.random.default_rng(1).normal(0, 0.04, tube()[0].shape)
         crumpled = write_mesh(self.folder / "crumpled.obj", tube()[0] + noise, tube()[1])

@@ -1,3 +1,5 @@
+#include <algorithm>
+
 #include <iostream>
 
 #include "client/shapectl/model_output.h"
@@ -19,9 +21,13 @@ void printText(const v1::ModelDescription& model) {
             << "  path steps   " << pga.path_steps() << "\n"
             << "  coarse mesh  " << pga.coarse_vertices() << " vertices\n"
             << "  bending      " << pga.bending() << " m^2\n"
+            << "  path energy  " << pathEnergyText(pga.path_energy()) << "\n"
             << "  eigenvalues ";
-  for (const double value : pga.eigenvalues()) std::cout << " " << value;
-  std::cout << " m^2\n";
+  const int shown = std::min(pga.eigenvalues_size(), static_cast<int>(pga.modes()));
+  for (int j = 0; j < shown; ++j) std::cout << " " << pga.eigenvalues(j);
+  std::cout << " m^2";
+  if (shown < pga.eigenvalues_size()) std::cout << ", and " << pga.eigenvalues_size() - shown << " smaller ones";
+  std::cout << "\n";
 }
 
 struct Describe {

@@ -12,6 +12,7 @@ namespace {
 struct Project {
   std::string name, mesh, out, coefficients;
   std::int64_t modes = 0;
+  bool fine = false;
 
   void declare(Arguments& arguments) {
     arguments.positional("NAME", name, "The model, NAME or NAME@VERSION");
@@ -19,6 +20,7 @@ struct Project {
     arguments.option("-o,--out", out, "OUT.ply", "Write the model's nearest shape");
     arguments.option("--coefficients", coefficients, "C.json", "Write its coefficients");
     arguments.option("--modes", modes, "J", "Principal variations to use (all)");
+    arguments.flag("--fine", fine, "Finish by Newton's method at full resolution");
   }
 
   ExitCode run(const Session& session) const {
@@ -28,6 +30,7 @@ struct Project {
     *request.mutable_model() = client::pinned(model.description);
     *request.mutable_shape() = client::readShape(mesh, model.mean.rows(), model.faces);
     request.set_modes(countOf("--modes", modes));
+    request.set_fine(fine);
     client::Call call(session.callOptions());
     v1::ProjectResponse response;
     client::require(v1::Shapes::NewStub(channel)->Project(call.context(), request, &response));

@@ -10,6 +10,7 @@ namespace {
 
 struct Synthesize {
   std::string name, coefficients, out;
+  bool fine = false;
 
   void declare(Arguments& arguments) {
     arguments.positional("NAME", name, "The model, NAME or NAME@VERSION");
@@ -17,11 +18,13 @@ struct Synthesize {
     arguments.required();
     arguments.option("-o,--out", out, "OUT.ply", "Write the shape");
     arguments.required();
+    arguments.flag("--fine", fine, "Finish by Newton's method at full resolution");
   }
 
   ExitCode run(const Session& session) const {
     v1::SynthesizeRequest request;
     *request.mutable_coefficients() = readCoefficients(coefficients);
+    request.set_fine(fine);
     const auto channel = session.channel();
     const auto model = client::getModelMesh(channel, parseModel(name), session.callOptions());
     *request.mutable_model() = client::pinned(model.description);

@@ -19,7 +19,7 @@ void row6Projection() {
     std::vector<double> seconds;
     for (const auto i : unseen) {
       const Stopwatch watch;
-      const auto projection = project(*model, set.shapes[i], {modes, {}});
+      const auto projection = project(*model, set.shapes[i], {modes, false, {}});
       seconds.push_back(watch.cpu());
       energy += projection.solution.residual_energy / static_cast<double>(unseen.size());
       smallest_area_ratio = std::min(smallest_area_ratio, projection.solution.smallest_area_ratio);
