@@ -16,15 +16,20 @@ void sendAll(Stream& stream, const v1::FitMarkersRequest::Setup& setup, const Ma
   bool open = stream.Write(message);
   for (const auto number : frames.numbers) {
     if (!open) break;
-    auto& frame = *message.mutable_frame();
-    frame.set_frame(static_cast<std::uint32_t>(number));
-    pack(frames.positions(number), *frame.mutable_positions());
+    *message.mutable_frame() = packFrame(frames, number);
     open = stream.Write(message);
   }
   stream.WritesDone();
 }
 
 }  // namespace
+
+v1::MarkerFrame packFrame(const MarkerFrames& frames, std::int64_t number) {
+  v1::MarkerFrame frame;
+  frame.set_frame(static_cast<std::uint32_t>(number));
+  pack(frames.positions(number), *frame.mutable_positions());
+  return frame;
+}
 
 v1::MarkerSet pack(const MarkerSet& set) {
   v1::MarkerSet packed;

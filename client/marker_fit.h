@@ -18,6 +18,9 @@ struct MarkerFrames {
   std::function<Vertices(std::int64_t number)> positions;  ///< L x 3 in the order of the set [m]; NaN where not seen
 };
 
+/// A frame as the wire has it.
+v1::MarkerFrame packFrame(const MarkerFrames& frames, std::int64_t number);
+
 /// Streams the frames and hears an answer for each, in order, while later frames are still being sent.
 /// Throws RpcError when the daemon refuses or the call is aborted, and whatever `answer` throws.
 void fitMarkers(const std::shared_ptr<grpc::Channel>& channel, const v1::FitMarkersRequest::Setup& setup,

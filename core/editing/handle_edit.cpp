@@ -130,22 +130,22 @@ Outcome HandleEditor::round(const Vertices& prior, State& state) {
   return outcome;
 }
 
-/// Over the energy plus a hundredth of the squared distance that the edit moves the model: where the submanifold meets
+/// Over the energy plus a tenth of the squared distance that the edit moves the model: where the submanifold meets
 /// the handles the energy itself goes to zero.
 double HandleEditor::relativeFall(const State& before, const State& after) const {
   const double reach = energy(submanifold_.pga().mean, after.projection.shape);
-  return (before.energy - after.energy) / (after.energy + 1e-2 * reach);
+  return (before.energy - after.energy) / (after.energy + 0.1 * reach);
 }
 
 /// Where the next round starts: at the last projection, or ahead of it where the accelerator sees a way.
 void HandleEditor::chooseStart(const Start& last, Outcome& outcome) {
-  accelerator_.add(last.point, state_.projection.point);
+  accelerator_.add({last.point}, {state_.projection.point});
   start_ = plainStart();
-  const auto point = accelerator_.propose();
-  if (!point) return;
-  auto ahead = submanifold_.shapeOf(*point, options_.submanifold, &state_.projection.realised);
+  const auto proposed = accelerator_.propose();
+  if (!proposed) return;
+  auto ahead = submanifold_.shapeOf(proposed->point, options_.submanifold, &state_.projection.realised);
   outcome.iterations += ahead.iterations;
-  if (ahead.converged()) start_ = {*point, ahead.solution.shape(), true};
+  if (ahead.converged()) start_ = {proposed->point, ahead.solution.shape(), true};
 }
 
 Outcome HandleEditor::alternate() {

@@ -24,7 +24,7 @@ struct HandleEditOptions {
 /// Minimises W[s, P[s]] subject to the handles by alternating between s (Newton's method with the handles as
 /// constraints, by an augmented Lagrangian) and P[s], accelerated by extrapolation (ProjectionAccelerator). What would
 /// raise the energy is not taken, so the energies fall; the outcome is converged when they settle: when one alternation
-/// lowers W[s, P[s]] by less than `tolerance` of itself plus a hundredth of W[mean, P[s]]. Weights of the handles are not used. The handles must
+/// lowers W[s, P[s]] by less than `tolerance` of itself plus a tenth of W[mean, P[s]]. Weights of the handles are not used. The handles must
 /// determine the placement (determinePlacement), else InvalidInput naming "handles".
 Solved<HandleEdit> editByHandles(const Submanifold& submanifold, const std::vector<AnchorTarget>& handles,
                                  const HandleEditOptions& options);

@@ -4,14 +4,35 @@
 
 namespace shaped {
 
-void ProjectionAccelerator::add(const SubmanifoldPoint& input, const SubmanifoldPoint& output) {
+Eigen::VectorXd ProjectionAccelerator::coordinates(const State& state) const {
+  Eigen::VectorXd result = submanifold_.tangentCoordinates(state.point);
+  result.conservativeResize(result.size() + 1);
+  result[result.size() - 1] = state.extra;
+  return result;
+}
+
+ProjectionAccelerator::State ProjectionAccelerator::stateAt(const Eigen::VectorXd& end) const {
+  const auto half = (end.size() - 1) / 2;
+  const Eigen::VectorXd v = end.head(2 * half);
+  // a weight below zero is one above zero on the opposite variation
+  const Eigen::VectorXd below = (-v).cwiseMax(0);
+  Eigen::VectorXd valid = v.cwiseMax(0);
+  valid.head(half) += below.tail(half);
+  valid.tail(half) += below.head(half);
+  const double total = valid.sum();
+  return {{valid / total, 1 / total}, end[2 * half]};
+}
+
+void ProjectionAccelerator::add(const State& input, const State& output) {
   constexpr std::size_t memory = 5;
-  steps_.push_back({output.alpha / output.scale,
-                    submanifold_.tangentCoordinates(output) - submanifold_.tangentCoordinates(input)});
+  Eigen::VectorXd end = output.point.alpha / output.point.scale;
+  end.conservativeResize(end.size() + 1);
+  end[end.size() - 1] = output.extra;
+  steps_.push_back({std::move(end), coordinates(output) - coordinates(input)});
   if (steps_.size() > memory) steps_.pop_front();
 }
 
-std::optional<SubmanifoldPoint> ProjectionAccelerator::propose() const {
+std::optional<ProjectionAccelerator::State> ProjectionAccelerator::propose() const {
   constexpr double reach = 30;
   if (steps_.size() < 2) return std::nullopt;
   const auto& last = steps_.back();
@@ -25,23 +46,10 @@ std::optional<SubmanifoldPoint> ProjectionAccelerator::propose() const {
   Eigen::ColPivHouseholderQR<Eigen::MatrixXd> least_squares;
   least_squares.setThreshold(1e-3);
   const Eigen::VectorXd weights = least_squares.compute(step_changes).solve(last.step);
-  Eigen::VectorXd move = -end_changes * weights;
-  const auto point = [&](double length) {
-    const Eigen::VectorXd v = last.end + length * move;
-    const auto half = v.size() / 2;
-    // a weight below zero is one above zero on the opposite variation
-    const Eigen::VectorXd below = (-v).cwiseMax(0);
-    Eigen::VectorXd valid = v.cwiseMax(0);
-    valid.head(half) += below.tail(half);
-    valid.tail(half) += below.head(half);
-    const double total = valid.sum();
-    return SubmanifoldPoint{valid / total, 1 / total};
-  };
-  const SubmanifoldPoint end{last.end / last.end.sum(), 1 / last.end.sum()};
-  const double distance =
-      (submanifold_.tangentCoordinates(point(1)) - submanifold_.tangentCoordinates(end)).norm();
+  const Eigen::VectorXd move = -end_changes * weights;
+  const double distance = (coordinates(stateAt(last.end + move)) - coordinates(stateAt(last.end))).norm();
   if (!std::isfinite(distance)) return std::nullopt;
-  return point(std::min(1.0, reach * last.step.norm() / std::max(distance, 1e-300)));
+  return stateAt(last.end + std::min(1.0, reach * last.step.norm() / std::max(distance, 1e-300)) * move);
 }
 
 }  // namespace shaped

@@ -16,21 +16,30 @@ class ProjectionAccelerator {
  public:
   explicit ProjectionAccelerator(const Submanifold& submanifold) : submanifold_(submanifold) {}
 
+  /// Where a round starts or ends.
+  struct State {
+    SubmanifoldPoint point;
+    double extra = 0;  ///< a further unknown of the iteration, scaled to [m]
+  };
+
   /// Remembers that a round which started at `input` ended at `output`.
-  void add(const SubmanifoldPoint& input, const SubmanifoldPoint& output);
+  void add(const State& input, const State& output);
 
   /// Where the iteration seems to go; empty while there are not two steps to tell. The proposal lies at most thirty times
   /// the last step away.
-  std::optional<SubmanifoldPoint> propose() const;
+  std::optional<State> propose() const;
 
   /// Drops what was remembered.
   void forget() { steps_.clear(); }
 
  private:
   struct Step {
-    Eigen::VectorXd end;   ///< v of the output
-    Eigen::VectorXd step;  ///< tangent coordinates of the output less those of the input [m]
+    Eigen::VectorXd end;   ///< v of the output, then its extra unknown
+    Eigen::VectorXd step;  ///< tangent coordinates and extra unknown of the output less those of the input [m]
   };
+
+  Eigen::VectorXd coordinates(const State& state) const;
+  State stateAt(const Eigen::VectorXd& end) const;
 
   const Submanifold& submanifold_;
   std::deque<Step> steps_;

@@ -149,23 +149,20 @@ Solved<Vertices> GeodesicCalculus::between(const Vertices& a, const Vertices& b,
   return minimiseShell(objective, *structure_, start, newton);
 }
 
-Solved<Vertices> GeodesicCalculus::through(const Vertices& a, const Vertices& inner, double t, const GeodesicOptions& options,
-                                           const Vertices& near) const {
+Solved<Vertices> GeodesicCalculus::through(const Vertices& a, const Vertices& inner, double t,
+                                           const GeodesicOptions& options) const {
   if (t == 1) return {inner, Outcome{}};
-  Vertices start = near;
-  if (start.rows() == 0)
-    start = reconstruction_->reconstruct(blendMeasures(measure(topology(), a), measure(topology(), inner), 1 / t), inner);
-  if (start.rows() == 0 || !std::isfinite(shellEnergy(topology(), inner, start, bending()))) start = inner;
-  return solveForDeformed(*structure_, energy_, a, inner, aligned(start, inner), options, (1 - t) / t);
+  const double rest = (1 - t) / t;
+  return solveForDeformed(*structure_, energy_, a, inner, aligned(predict(a, inner, rest), inner), options, rest);
 }
 
-Vertices GeodesicCalculus::predict(const Vertices& previous, const Vertices& current) const {
+Vertices GeodesicCalculus::predict(const Vertices& previous, const Vertices& current, double length) const {
   const auto before = measure(topology(), previous), here = measure(topology(), current);
-  const double step = shellEnergy(topology(), before, here, bending());
-  const Vertices straight = 2 * current - aligned(previous, current);
+  const double step = length * length * shellEnergy(topology(), before, here, bending());
+  const Vertices straight = current + length * (current - aligned(previous, current));
   const double straight_energy = shellEnergy(topology(), here, measure(topology(), straight), bending());
   if (straight_energy < 2 * step) return straight;
-  const Vertices curved = reconstruction_->reconstruct(blendMeasures(before, here, 2), current);
+  const Vertices curved = reconstruction_->reconstruct(blendMeasures(before, here, 1 + length), current);
   if (curved.rows() > 0) {
     const double curved_energy = shellEnergy(topology(), here, measure(topology(), curved), bending());
     if (curved_energy < straight_energy || !std::isfinite(straight_energy)) return curved;
@@ -174,14 +171,13 @@ Vertices GeodesicCalculus::predict(const Vertices& previous, const Vertices& cur
 }
 
 Solved<Vertices> GeodesicCalculus::extrapolate(const Vertices& previous, const Vertices& current,
-                                               const GeodesicOptions& options, const Vertices& near) const {
-  const Vertices start = near.rows() > 0 ? aligned(near, current) : predict(previous, current);
-  return solveForDeformed(*structure_, energy_, previous, current, start, options);
+                                               const GeodesicOptions& options) const {
+  return solveForDeformed(*structure_, energy_, previous, current, predict(previous, current, 1), options);
 }
 
 Solved<Vertices> GeodesicCalculus::extrapolateBackwards(const Vertices& current, const Vertices& next,
                                                         const GeodesicOptions& options) const {
-  return solveForUndeformed(*structure_, energy_, current, next, predict(next, current), options);
+  return solveForUndeformed(*structure_, energy_, current, next, predict(next, current, 1), options);
 }
 
 Solved<Vertices> GeodesicCalculus::at(const Path& path, double t, const GeodesicOptions& options) const {

@@ -38,9 +38,8 @@ class GeodesicCalculus {
                            const Path& warm = {}) const;
 
   /// The shape after `current` on the discrete geodesic that runs through `previous`: W,2[previous, current] +
-  /// W,1[current, next] = 0, equation (23). near: a shape like the next one, or empty.
-  Solved<Vertices> extrapolate(const Vertices& previous, const Vertices& current, const GeodesicOptions& options,
-                               const Vertices& near = {}) const;
+  /// W,1[current, next] = 0, equation (23).
+  Solved<Vertices> extrapolate(const Vertices& previous, const Vertices& current, const GeodesicOptions& options) const;
 
   /// The shape before `current` where `next` follows: W,2[previous, current] + W,1[current, next] = 0.
   Solved<Vertices> extrapolateBackwards(const Vertices& current, const Vertices& next,
@@ -54,9 +53,8 @@ class GeodesicCalculus {
   Solved<Vertices> between(const Vertices& a, const Vertices& b, double t, const GeodesicOptions& options) const;
 
   /// The inverse of (24): the shape b of which between(a, b, t) is `inner`, (1 - t) W,2[a, inner] + t W,1[inner, b] = 0;
-  /// t in (0, 1]. near: a shape like b, or empty.
-  Solved<Vertices> through(const Vertices& a, const Vertices& inner, double t, const GeodesicOptions& options,
-                           const Vertices& near = {}) const;
+  /// t in (0, 1].
+  Solved<Vertices> through(const Vertices& a, const Vertices& inner, double t, const GeodesicOptions& options) const;
 
   /// K sum_k W[s_{k-1}, s_k], the squared distance of the ends when the path is a geodesic [m^2].
   double pathEnergy(const Path& path) const;
@@ -73,7 +71,8 @@ class GeodesicCalculus {
   Path startPath(const Vertices& a, const Vertices& b, int steps, const std::stop_token& stop) const;
   Solved<Path> cascade(const Vertices& a, const Vertices& b, int steps, const GeodesicOptions& options) const;
   Solved<Path> relaxPath(Path path, const GeodesicOptions& options) const;
-  Vertices predict(const Vertices& previous, const Vertices& current) const;
+  /// Where the way from `previous` to `current` leads when it goes on `length` times as far again.
+  Vertices predict(const Vertices& previous, const Vertices& current, double length) const;
 
   ShellStructurePtr structure_;
   PairEnergy energy_;

@@ -4,6 +4,7 @@
 #include <string>
 
 #include "core/editing/anchored_fit.h"
+#include "core/editing/projection_accelerator.h"
 #include "core/statistics/submanifold.h"
 
 namespace shaped {
@@ -25,7 +26,7 @@ struct MarkerTrackerOptions {
   double prior_weight = 1;      ///< gamma of (22), > 0
   double robust_scale = 0.05;   ///< distance at which a marker's pull is quartered, over the model's size; 0 = least squares
   int alternations = 1;         ///< projections a frame after the first, >= 1
-  int first_alternations = 10;  ///< at most, in the first frame, >= 1
+  int first_alternations = 30;  ///< at most, in the first frame, >= 1
   std::optional<double> scale;  ///< size of the subject over that of the model; estimated where not given
   /// Looser than elsewhere: the markers' own error is far above what this costs.
   SubmanifoldOptions submanifold{.tolerance = 1e-3, .shape_tolerance = 1e-5, .stop = {}};
@@ -48,7 +49,7 @@ struct MarkerFit {
 };
 
 /// Fits a sequence of marker frames by the alternating scheme for (22) of [HZRS18]: s for fixed P[s], then P[s]; each
-/// frame starts from the last one. The first frame is placed and scaled by a robust similarity of the mean's marker points.
+/// frame starts from the last one. The first frame, and each that calibrates the size, is placed and scaled by a robust similarity of the mean's marker points.
 /// While a shape has yet to follow its markers, they are judged outliers at three times their median residual; after that
 /// at the robust scale.
 ///
@@ -59,12 +60,31 @@ class MarkerTracker {
   /// the option at fault.
   MarkerTracker(std::shared_ptr<const Submanifold> submanifold, std::vector<MarkerSite> sites, MarkerTrackerOptions options);
 
+  /// Estimates the size of the subject from several frames, before the first fit(): the geometric mean of what each of them
+  /// says on its own, weighted by the inverse square of the fitting energy (22) that it ends with. A frame that the model
+  /// does not explain, or that was aligned wrongly, hardly counts. Nothing changes where a scale was given or no frame converges; then the first fitted frame tells the size.
+  /// Throws InvalidInput naming calibration[i] when that frame has not L rows or does not determine a placement.
+  Outcome calibrate(const std::vector<MarkerPositions>& frames);
+
   /// Fits the next frame. Throws InvalidInput naming "markers" when the frame has not L rows, or when it is the first
   /// and fewer than three markers, or only markers on one line, were seen.
   Solved<MarkerFit> fit(const MarkerPositions& markers);
 
  private:
-  void takeMarkers(const MarkerPositions& markers);
+  /// Everything that belongs to the current frame, and what the next one starts from.
+  struct State {
+    double scale = 1;
+    std::vector<AnchorTarget> targets;  ///< of the current frame: scaled-down markers without their offsets
+    Vertices markers;                   ///< of the current frame, scaled down; zero where not seen
+    Vertices shape;                     ///< s, unscaled, placed as the scaled-down markers
+    Vertices prior;                     ///< P[s]
+    SubmanifoldProjection projection;
+    double energy = 0;                  ///< robustEnergy() at the end of a round
+  };
+
+  void takeMarkers(const MarkerPositions& markers, const std::string& field);
+  bool placeable();
+  double fittingEnergy() const;
   Vertices modelPoints(const Vertices& shape) const;
   Eigen::Vector3d offsetOn(const Vertices& shape, const MarkerSite& site) const;
   void followRigidly();
@@ -78,6 +98,9 @@ class MarkerTracker {
   double neighbourRatio() const;
   Outcome fitShape();
   Outcome projectShape();
+  double robustEnergy(double distance) const;
+  Outcome round(bool estimate_scale);
+  bool lookAhead(const ProjectionAccelerator& accelerator, ProjectionAccelerator::State& start);
   Outcome alternate(bool estimate_scale);
   Outcome firstFrame();
   Outcome nextFrame();
@@ -86,14 +109,9 @@ class MarkerTracker {
   std::shared_ptr<const Submanifold> submanifold_;
   std::vector<MarkerSite> sites_;
   MarkerTrackerOptions options_;
-  double size_;       ///< of the mean [m]
-  double scale_ = 1;
-  std::vector<AnchorTarget> targets_;  ///< of the current frame: scaled-down markers without their offsets
-  Vertices markers_;                   ///< of the current frame, scaled down; zero where not seen
+  double size_;  ///< of the mean [m]
   bool started_ = false;
-  Vertices shape_;    ///< s, unscaled, placed as the scaled-down markers
-  Vertices prior_;    ///< P[s]
-  SubmanifoldProjection projection_;
+  State state_;
 };
 
 }  // namespace shaped

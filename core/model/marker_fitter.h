@@ -20,6 +20,9 @@ class MarkerFitter {
   /// out of range.
   MarkerFitter(ShellPgaModelPtr model, const MarkerSet& markers, const MarkerTrackerOptions& options);
 
+  /// Estimates the subject's size from several frames, as MarkerTracker::calibrate.
+  Outcome calibrate(const std::vector<MarkerPositions>& frames) { return tracker_.calibrate(frames); }
+
   /// Fits the next frame: L x 3 [m], a row of NaN for a marker that was not seen. Throws as MarkerTracker::fit.
   Solved<FittedFrame> fit(const MarkerPositions& markers);
 

@@ -132,6 +132,9 @@ Solved<ShellPgaEvaluation> evaluate(const ShellPgaModel& model, const std::vecto
     throw InvalidInput("folds", std::to_string(options.folds) + ", want 0 (leave one out) or 2 to " + std::to_string(shapes.size()));
   const std::size_t folds = options.folds == 0 ? shapes.size() : static_cast<std::size_t>(options.folds);
   const auto smallest_training = static_cast<int>(shapes.size() - (shapes.size() + folds - 1) / folds);
+  if (smallest_training < 2)
+    throw InvalidInput("folds", std::to_string(options.folds) + " leaves one of the " + std::to_string(shapes.size()) +
+                                    " shapes for training, want at least two");
   ShellPgaEvaluation result;
   result.modes = chosenModes(model, options, std::min(model.modes(), smallest_training - 1));
   result.generalisation.resize(result.modes.size());

@@ -1,5 +1,7 @@
 #include "core/model/shell_pga_file.h"
 
+#include <limits>
+
 #include "core/io/file_error.h"
 
 namespace shaped {
@@ -19,7 +21,9 @@ Outcome outcomeFrom(const nlohmann::json& json) {
                           Termination::kCancelled, Termination::kNumericalFailure})
     if (name(kind) == text) outcome.termination = kind;
   outcome.iterations = json.at("iterations").get<int>();
-  outcome.residual = json.at("residual").get<double>();
+  // JSON has no infinities: a residual that is not finite is written as null
+  const auto& residual = json.at("residual");
+  outcome.residual = residual.is_null() ? std::numeric_limits<double>::infinity() : residual.get<double>();
   return outcome;
 }
 

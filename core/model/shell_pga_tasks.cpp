@@ -63,17 +63,22 @@ Vertices solveAtFullResolution(const ShellPgaModel& model, const SubmanifoldPoin
   return solved.solution.shape();
 }
 
+/// Modes of less than this share of the largest variance, or of a negative one, carry no information about the training
+/// shapes: the Gram matrix is exact to second order in 1/K only.
+constexpr double kLeastVariance = 1e-6;
+
 }  // namespace
 
 ShellPgaScore scoreOf(const ShellPgaModel& model, const Eigen::VectorXd& tangent_coordinates) {
   constexpr double log_two_pi = 1.8378770664093453;
   const auto count = tangent_coordinates.size();
-  const Eigen::ArrayXd variances = model.pga().eigenvalues.head(count).array().max(1e-300);
-  ShellPgaScore score;
-  const double squared = (tangent_coordinates.array().square() / variances).sum();
-  score.mahalanobis = std::sqrt(squared);
-  score.log_likelihood = -0.5 * (squared + variances.log().sum() + static_cast<double>(count) * log_two_pi);
-  return score;
+  const auto& variances = model.pga().eigenvalues;
+  double squared = 0, constants = 0;
+  for (Eigen::Index j = 0; j < count && variances[j] > kLeastVariance * variances[0]; ++j) {
+    squared += tangent_coordinates[j] * tangent_coordinates[j] / variances[j];
+    constants += std::log(variances[j]) + log_two_pi;
+  }
+  return {std::sqrt(squared), -0.5 * (squared + constants), 0};
 }
 
 Solved<ShellPgaProjection> project(const ShellPgaModel& model, const Vertices& shape, const ProjectionOptions& options) {

@@ -5,7 +5,8 @@
 
 namespace shaped {
 
-/// How probable a shape is under the model: a Gaussian in the tangent coordinates with the eigenvalues as variances.
+/// How probable a shape is under the model: a Gaussian in the tangent coordinates with the eigenvalues as variances. Modes
+/// with less than 1e-6 of the largest variance, or with a negative one, do not count.
 struct ShellPgaScore {
   double mahalanobis = 0;        ///< distance of the projection to the mean in units of the model's deviations
   double log_likelihood = 0;     ///< of the projection's J tangent coordinates [m], natural logarithm of the density

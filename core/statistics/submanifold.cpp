@@ -27,13 +27,6 @@ Eigen::VectorXd secondForce(const GeodesicCalculus& calculus, const ShellMeasure
   return result;
 }
 
-/// Where the next shape after `here` lies if it moved away from near[k + 1] as `here` did from near[k].
-Vertices follow(const Path& near, std::size_t k, const Vertices& here) {
-  if (near.empty()) return {};
-  const auto motion = alignRigidly(near[k], here);
-  return apply(motion, near[k + 1]) + here - apply(motion, near[k]);
-}
-
 }  // namespace
 
 Submanifold::Submanifold(std::shared_ptr<const GeodesicCalculus> calculus, std::shared_ptr<const ShellPga> pga)
@@ -210,7 +203,7 @@ Solved<SubmanifoldProjection> Submanifold::project(const Vertices& shape, const 
                                        local_shape, result.local_energy);
   outcome += weights;
   result.point.alpha = weights.solution.alpha;
-  auto scaled = rescale(local_shape, result.point.scale, warm ? warm->realised.nodes : path.solution, options);
+  auto scaled = rescale(local_shape, result.point.scale, options);
   outcome += scaled;
   result.realised = {std::move(local_shape), std::move(scaled.solution)};
   result.shape = result.realised.shape();
@@ -218,13 +211,11 @@ Solved<SubmanifoldProjection> Submanifold::project(const Vertices& shape, const 
   return {std::move(result), outcome};
 }
 
-Solved<Path> Submanifold::rescale(const Vertices& local, double scale, const Path& near,
-                                  const SubmanifoldOptions& options) const {
+Solved<Path> Submanifold::rescale(const Vertices& local, double scale, const SubmanifoldOptions& options) const {
   // Far from the mean (23) may have no solution for steps as long as a K-th of the way; then shorter ones.
   int spent = 0;
   for (int steps = pga_->path_steps;; steps *= 2) {
-    const bool same_steps = near.size() == static_cast<std::size_t>(steps) + 1;
-    auto marched = march(local, scale, steps, same_steps ? near : Path(), options);
+    auto marched = march(local, scale, steps, options);
     spent += marched.iterations;
     if (marched.converged() || marched.termination == Termination::kCancelled || scale * steps > 1) {
       marched.iterations = spent;
@@ -233,8 +224,11 @@ Solved<Path> Submanifold::rescale(const Vertices& local, double scale, const Pat
   }
 }
 
-Solved<Path> Submanifold::march(const Vertices& local, double scale, int steps, const Path& near,
+Solved<Path> Submanifold::march(const Vertices& local, double scale, int steps,
                                 const SubmanifoldOptions& options) const {
+  // No step starts from the nodes of a similar shape: a dent in one of them, where the surface has snapped through, would
+  // be handed on from shape to shape.
+  //
   // The exact inverse of the scaling: local lies at rho times the steps on the first segment of a geodesic from the
   // mean, whose first node follows from (24) and the others by (23). So a shape whose local one is on the submanifold
   // comes back.
@@ -243,11 +237,11 @@ Solved<Path> Submanifold::march(const Vertices& local, double scale, int steps, 
     auto end = calculus_->at({pga_->mean, local}, 1 / scale, geodesic_options);
     return {Path{pga_->mean, std::move(end.solution)}, end};
   }
-  auto first = calculus_->through(pga_->mean, local, scale * steps, geodesic_options, near.empty() ? Vertices() : near[1]);
+  auto first = calculus_->through(pga_->mean, local, scale * steps, geodesic_options);
   Outcome outcome = first;
   Path nodes{pga_->mean, std::move(first.solution)};
   for (std::size_t k = 1; k < static_cast<std::size_t>(steps) && outcome.converged(); ++k) {
-    auto next = calculus_->extrapolate(nodes[k - 1], nodes[k], geodesic_options, follow(near, k, nodes[k]));
+    auto next = calculus_->extrapolate(nodes[k - 1], nodes[k], geodesic_options);
     outcome += next;
     nodes.push_back(std::move(next.solution));
   }
@@ -265,7 +259,7 @@ Solved<SubmanifoldShape> Submanifold::shapeOf(const SubmanifoldPoint& point, con
     throw InvalidInput("alpha", "sums to " + std::to_string(point.alpha.sum()) + ", want 1");
   if (!(point.scale > 0) || !std::isfinite(point.scale)) throw InvalidInput("scale", "must be a positive number");
   auto local = average(point.alpha, warm ? warm->local : pga_->mean, options);
-  auto scaled = rescale(local.solution, point.scale, warm ? warm->nodes : Path(), options);
+  auto scaled = rescale(local.solution, point.scale, options);
   Outcome outcome = local;
   outcome += scaled;
   return {{std::move(local.solution), std::move(scaled.solution)}, outcome};

@@ -31,7 +31,9 @@ struct SubmanifoldOptions {
   int modes = 0;                  ///< J to use, 1 .. model's; 0 = all
   double kappa = 0.5;             ///< of (17), in (0, 1)
   int max_iterations = 50;        ///< of the weights' optimisation, >= 1
-  double tolerance = 1e-6;        ///< of the weights: sqrt(gain that a step promises / W[mean, s_loc]), > 0
+  /// Of the weights: sqrt(gain that a step promises / W[mean, s_loc]), > 0. Where the submanifold contains the shape, the
+  /// inner solves leave gains of 1e-6 that no step can collect.
+  double tolerance = 1e-5;
   double shape_tolerance = 1e-8;  ///< of every inner shape solve, > 0
   std::stop_token stop;
 };
@@ -74,11 +76,9 @@ class Submanifold {
   Solved<SubmanifoldPoint> optimiseWeights(const ShellMeasures& target, const std::vector<std::size_t>& vertices,
                                            Eigen::VectorXd start, const SubmanifoldOptions& options, Vertices& q,
                                            double& energy) const;
-  /// I(mean, local, 1 / scale) in K steps, or more where K do not get there: the shapes from the mean to there. near: the
-  /// same for a similar shape, or empty.
-  Solved<Path> rescale(const Vertices& local, double scale, const Path& near, const SubmanifoldOptions& options) const;
-  Solved<Path> march(const Vertices& local, double scale, int steps, const Path& near,
-                     const SubmanifoldOptions& options) const;
+  /// I(mean, local, 1 / scale) in K steps, or more where K do not get there: the shapes from the mean to there.
+  Solved<Path> rescale(const Vertices& local, double scale, const SubmanifoldOptions& options) const;
+  Solved<Path> march(const Vertices& local, double scale, int steps, const SubmanifoldOptions& options) const;
 
   std::shared_ptr<const GeodesicCalculus> calculus_;
   std::shared_ptr<const ShellPga> pga_;

@@ -68,11 +68,11 @@ MarkerSet markerSetFromProto(const v1::MarkerSet& message,
   return chosen;
 }
 
-Vertices markersFromProto(const v1::MarkerFrame& frame, Eigen::Index count) {
-  auto markers = pointsFromProto(frame.positions(), count, "frame.positions");
+Vertices markersFromProto(const v1::MarkerFrame& frame, Eigen::Index count, const std::string& field) {
+  auto markers = pointsFromProto(frame.positions(), count, field + ".positions");
   for (Eigen::Index i = 0; i < count; ++i) {
     if (markers.row(i).array().isInf().any())
-      throw InvalidInput("frame.positions", "marker " + std::to_string(i) + " has an infinite coordinate");
+      throw InvalidInput(field + ".positions", "marker " + std::to_string(i) + " has an infinite coordinate");
     if (markers.row(i).array().isNaN().any()) markers.row(i).setConstant(std::numeric_limits<double>::quiet_NaN());
   }
   return markers;

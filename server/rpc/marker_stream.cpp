@@ -1,6 +1,7 @@
 #include "server/rpc/marker_stream.h"
 
 #include <optional>
+#include <utility>
 
 #include "core/model/marker_fitter.h"
 #include "core/numerics/error.h"
@@ -46,10 +47,26 @@ class MarkerStream final : public StreamHandler<v1::FitMarkersRequest, v1::FitMa
     marker_count_ = std::ssize(markers.markers);
     with_shapes_ = !setup.without_shapes();
     fitter_.emplace(served_->shell_pga, markers, options);
+    takeCalibration(setup);
+  }
+
+  void takeCalibration(const v1::FitMarkersRequest::Setup& setup) {
+    constexpr int most = 16;
+    if (setup.calibration_size() > most)
+      throw InvalidInput("setup.calibration", "has " + std::to_string(setup.calibration_size()) + " frames, want at most " +
+                                                  std::to_string(most));
+    for (int i = 0; i < setup.calibration_size(); ++i)
+      calibration_.push_back(
+          markersFromProto(setup.calibration(i), marker_count_, "setup.calibration[" + std::to_string(i) + "]"));
   }
 
   void fit(const v1::MarkerFrame& frame, v1::FitMarkersResponse& response, Call& call) {
-    const auto solved = fitter_->fit(markersFromProto(frame, marker_count_));
+    const auto markers = markersFromProto(frame, marker_count_);
+    // part of the first frame, whose answer reports its time and iterations
+    const Outcome calibrated = fitter_->calibrate(std::exchange(calibration_, {}));
+    if (calibrated.termination == Termination::kCancelled) throw Stopped();
+    auto solved = fitter_->fit(markers);
+    solved.iterations += calibrated.iterations;
     const auto& fitted = solved.solution;
     setAnswer(*served_, solved, fitted.smallest_area_ratio, call, response);
     response.set_frame(frame.frame());
@@ -64,6 +81,7 @@ class MarkerStream final : public StreamHandler<v1::FitMarkersRequest, v1::FitMa
   ModelStore& store_;
   ServedModelPtr served_;
   std::optional<MarkerFitter> fitter_;
+  std::vector<MarkerPositions> calibration_;  ///< frames that are still to tell the subject's size
   Eigen::Index marker_count_ = 0;
   bool with_shapes_ = true;
 };

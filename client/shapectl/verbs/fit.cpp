@@ -1,3 +1,4 @@
+#include <algorithm>
 #include <cmath>
 #include <optional>
 
@@ -92,7 +93,7 @@ class Report {
 
 struct Fit {
   std::string name, trial_file, set_file, range, out, report_file;
-  std::int64_t modes = 0;
+  std::int64_t modes = 0, calibration = 3;
   double prior_weight = 0, scale = 0;
 
   void declare(Arguments& arguments) {
@@ -106,6 +107,7 @@ struct Fit {
     arguments.option("--modes", modes, "J", "Principal variations to use (all)");
     arguments.option("--prior-weight", prior_weight, "G", "Weight of the model against the markers (1)");
     arguments.option("--scale", scale, "S", "Size of the subject over that of the model (estimated)");
+    arguments.option("--calibration", calibration, "N", "Frames, spread over the trial, that tell the size, 1 to 16 (3)");
   }
 
   ExitCode run(const Session& session) const {
@@ -140,6 +142,7 @@ struct Fit {
     setup.set_modes(countOf("--modes", modes));
     setup.set_prior_weight(prior_weight);
     setup.set_scale(scale);
+    if (scale == 0) addCalibration(frames, setup);
     setup.set_without_shapes(out.empty());
     std::optional<FrameWriter> writer;
     if (!out.empty()) writer.emplace(out);
@@ -152,6 +155,21 @@ struct Fit {
                "RMS " + std::to_string(1000 * response.rms()) + " mm");
     });
     if (writer) writer->close();
+  }
+
+  /// The frames with most markers, each out of one of `calibration` equal stretches of those that are fitted.
+  void addCalibration(const client::MarkerFrames& frames, v1::FitMarkersRequest::Setup& setup) const {
+    if (calibration < 1 || calibration > 16)
+      throw InvalidInput("--calibration", std::to_string(calibration) + ", want 1 to 16");
+    const auto& numbers = frames.numbers;
+    const auto stretches = std::min(static_cast<std::size_t>(calibration), numbers.size());
+    for (std::size_t k = 0; k < stretches; ++k) {
+      const auto begin = numbers.begin() + static_cast<std::ptrdiff_t>(k * numbers.size() / stretches);
+      const auto end = numbers.begin() + static_cast<std::ptrdiff_t>((k + 1) * numbers.size() / stretches);
+      const auto seen = [&](std::int64_t number) { return frames.positions(number).rowwise().sum().array().isFinite().count(); };
+      const auto best = std::max_element(begin, end, [&](auto a, auto b) { return seen(a) < seen(b); });
+      if (seen(*best) > 3) *setup.add_calibration() = client::packFrame(frames, *best);
+    }
   }
 
   static void print(const Report& report, const Session& session) {

@@ -1,5 +1,7 @@
 #include <algorithm>
 
+#include "core/mesh/alignment.h"
+#include "core/mesh/quality.h"
 #include "core/model/shell_pga_evaluation.h"
 #include "tests/benchmark/experiments/experiment.h"
 #include "tests/benchmark/experiments/models.h"
@@ -32,6 +34,20 @@ void compare(Report& report, const ShellPgaModel& model, const DataSet& set, std
   }
 }
 
+/// Without shapes that repeat an earlier one up to a rigid motion, which training refuses (two of the horse's poses do).
+DataSet distinct(const DataSet& set) {
+  std::vector<std::size_t> kept;
+  const double size = diameter(set.shapes.front());
+  for (std::size_t i = 0; i < set.shapes.size(); ++i) {
+    const auto& shape = set.shapes[i];
+    const bool repeated = std::any_of(kept.begin(), kept.end(), [&](std::size_t k) {
+      return rmsVertexDistance(apply(alignRigidly(shape, set.shapes[k]), shape), set.shapes[k]) < 1e-6 * size;
+    });
+    if (!repeated) kept.push_back(i);
+  }
+  return subset(set, kept);
+}
+
 ShellPgaModelPtr modelOf(const DataSet& set, int modes) {
   return keptOrTrained(set.name + "-" + std::to_string(set.shapes.size()), set, modes);
 }
@@ -40,7 +56,7 @@ ShellPgaModelPtr modelOf(const DataSet& set, int modes) {
 
 void row7Generalisation() {
   Report report("Row 7: generalisation to shapes left out, against linear PCA of aligned vertices");
-  for (const auto& set : {cactus(), bodies(), horse()}) {
+  for (const auto& set : {cactus(), bodies(), distinct(horse())}) {
     const int most = std::min(20, static_cast<int>(set.shapes.size()) - 3);
     std::vector<int> dimensions;
     for (const int d : {1, 2, 5, 10, 20})

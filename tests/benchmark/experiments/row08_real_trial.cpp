@@ -6,6 +6,7 @@
 #include "core/io/marker_set_file.h"
 #include "core/model/marker_fitter.h"
 #include "tests/benchmark/experiments/experiment.h"
+#include "tests/benchmark/experiments/calibration.h"
 #include "tests/benchmark/experiments/models.h"
 #include "tests/benchmark/experiments/timing.h"
 
@@ -96,14 +97,19 @@ void row8RealTrial() {
   Report report(text("Row 8: the real trial 85_02.c3d, frames %zu to %zu by %zu", first, last - 1, step));
   const OneThread one_thread;
   MarkerFitter fitter(model, markers, {});
+  std::vector<Vertices> frames;
+  for (std::size_t frame = first; frame < std::min(last, trial.frames.size()); frame += step)
+    frames.push_back(trial.frames[frame](rows, Eigen::all));
+  const Stopwatch calibration;
+  fitter.calibrate(calibrationFrames(frames));
+  report.entry("CPU s to estimate the size from 3 frames", text("%.1f", calibration.cpu()));
   std::optional<FrameWriter> out;
   if (const char* path = std::getenv("SHAPED_ROW8_OUT")) out.emplace(path);
   Record record;
-  std::size_t count = 0;
-  for (std::size_t frame = first; frame < std::min(last, trial.frames.size()); frame += step, ++count) {
-    const Vertices seen = trial.frames[frame](rows, Eigen::all);
+  for (std::size_t i = 0; i < frames.size(); ++i) {
+    const std::size_t frame = first + i * step;
     const Stopwatch watch;
-    const auto fitted = fitter.fit(seen);
+    const auto fitted = fitter.fit(frames[i]);
     record.seconds.push_back(watch.cpu());
     if (!fitted.converged()) record.failed.push_back(frame);
     take(record, fitted.solution.fit, *model, fitted.solution.smallest_area_ratio);
@@ -113,7 +119,7 @@ void row8RealTrial() {
     if (out) out->append(fitted.solution.shape);
   }
   if (out) out->close();
-  tell(report, record, markers, count);
+  tell(report, record, markers, frames.size());
 }
 
 }  // namespace shaped::experiments

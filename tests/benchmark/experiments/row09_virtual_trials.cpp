@@ -5,6 +5,7 @@
 #include "core/model/marker_fitter.h"
 #include "tests/benchmark/experiments/experiment.h"
 #include "tests/benchmark/experiments/linear_marker_fit.h"
+#include "tests/benchmark/experiments/calibration.h"
 #include "tests/benchmark/experiments/models.h"
 #include "tests/benchmark/experiments/timing.h"
 
@@ -61,6 +62,9 @@ Errors shellFit(Report& report, const ShellPgaModelPtr& model, const MarkerSet& 
   MarkerTrackerOptions options;
   options.prior_weight = prior_weight;
   MarkerFitter fitter(model, set, options);
+  const Stopwatch calibration;
+  fitter.calibrate(calibrationFrames(trial.markers));
+  report.entry(trial.name + ", ours: CPU s to estimate the size from 3 frames", text("%.1f", calibration.cpu()));
   std::vector<double> seconds;
   std::size_t converged = 0;
   double residual = 0;

@@ -108,11 +108,9 @@ TEST_CASE("through() undoes between(): the far end follows from the near one and
     INFO("t = " << t);
     const auto inner = s.calculus.between(s.a, s.b, t, {});
     REQUIRE(inner.converged());
-    for (const auto& guess : {Vertices(), s.b}) {
-      const auto far = s.calculus.through(s.a, inner.solution, t, {}, guess);
-      REQUIRE(far.converged());
-      CHECK(rigidGap(far.solution, s.b) < 1e-6 * s.size / t);
-    }
+    const auto far = s.calculus.through(s.a, inner.solution, t, {});
+    REQUIRE(far.converged());
+    CHECK(rigidGap(far.solution, s.b) < 1e-6 * s.size / t);
   }
 }
 
