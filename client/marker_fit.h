@@ -4,8 +4,8 @@
 #include <vector>
 
 #include "client/connection.h"
+#include "core/markers/marker_set.h"
 #include "core/mesh/types.h"
-#include "core/mocap/marker_set.h"
 #include "shaped/v1/shapes.grpc.pb.h"
 
 namespace shaped::client {

@@ -4,7 +4,7 @@
 #include <span>
 #include <string>
 
-#include "core/mocap/marker_trial.h"
+#include "core/markers/marker_trial.h"
 
 namespace shaped {
 

@@ -7,7 +7,7 @@
 
 #include "core/io/file.h"
 #include "core/io/text_scanner.h"
-#include "core/mocap/marker_trial.h"
+#include "core/markers/marker_trial.h"
 #include "core/numerics/error.h"
 
 namespace shaped {

@@ -7,7 +7,7 @@
 #include <string_view>
 #include <vector>
 
-#include "core/mocap/marker_set.h"
+#include "core/markers/marker_set.h"
 
 namespace shaped {
 

@@ -3,7 +3,7 @@
 #include <string>
 #include <string_view>
 
-#include "core/mocap/marker_trial.h"
+#include "core/markers/marker_trial.h"
 
 namespace shaped {
 

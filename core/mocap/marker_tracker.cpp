@@ -215,8 +215,9 @@ bool MarkerTracker::lookAhead(const ProjectionAccelerator& accelerator, Projecti
   return true;
 }
 
-/// From the mean, placed by the markers: rounds of shape and projection, accelerated, until their energy settles.
-Outcome MarkerTracker::alternate(bool estimate_scale) {
+/// From the mean, placed by the markers: rounds of shape and projection, accelerated, until their energy settles; or, after
+/// some, while it is above `hopeless_energy`.
+Outcome MarkerTracker::alternate(bool estimate_scale, double hopeless_energy) {
   place(estimate_scale);
   ProjectionAccelerator accelerator(*submanifold_);
   const auto state = [&] { return ProjectionAccelerator::State{state_.projection.point, size_ * std::log(state_.scale)}; };
@@ -237,6 +238,7 @@ Outcome MarkerTracker::alternate(bool estimate_scale) {
       continue;
     }
     if (!done.converged()) return {done.termination, total.iterations, done.residual};
+    if (count >= 8 && state_.energy > hopeless_energy) break;
     small_falls = last.energy - state_.energy <= 0.01 * state_.energy ? small_falls + 1 : 0;
     accelerator.add(start, state());
     last = state_;
@@ -254,18 +256,20 @@ bool MarkerTracker::placeable() {
 Outcome MarkerTracker::calibrate(const std::vector<MarkerPositions>& frames) {
   Outcome outcome;
   if (frames.empty() || options_.scale) return outcome;
-  double sum = 0, weights = 0;
+  double sum = 0, weights = 0, least_energy = std::numeric_limits<double>::infinity();
   for (std::size_t i = 0; i < frames.size(); ++i) {
     const std::string field = "calibration[" + std::to_string(i) + "]";
     state_.scale = 1;
     takeMarkers(frames[i], field);
     if (!placeable()) throw InvalidInput(field, "shows fewer than three markers, or only markers on one line");
-    const auto aligned = alternate(true);
+    // a frame that ends with three times the energy of another counts a ninth of it: no need to finish it
+    const auto aligned = alternate(true, 3 * least_energy);
     outcome.iterations += aligned.iterations;
     outcome.termination = aligned.termination;
     if (aligned.termination == Termination::kCancelled) break;
     if (!aligned.converged()) continue;
-    const double misfit = fittingEnergy(), weight = 1 / (misfit * misfit);
+    least_energy = std::min(least_energy, state_.energy);
+    const double misfit = std::max(state_.energy, 1e-12 * size_ * size_), weight = 1 / (misfit * misfit);
     sum += weight * std::log(state_.scale);
     weights += weight;
   }
@@ -274,14 +278,6 @@ Outcome MarkerTracker::calibrate(const std::vector<MarkerPositions>& frames) {
   options_.scale = state_.scale = std::exp(sum / weights);
   if (outcome.termination != Termination::kCancelled) outcome.termination = Termination::kConverged;
   return outcome;
-}
-
-/// (22) of the unscaled shape.
-double MarkerTracker::fittingEnergy() const {
-  const auto& calculus = submanifold_->calculus();
-  const Eigen::VectorXd squares = (modelPoints(state_.shape) - state_.markers).rowwise().squaredNorm();
-  return weightsOf(state_.targets).dot(squares) +
-         options_.prior_weight * shellEnergy(calculus.topology(), state_.shape, state_.prior, calculus.bending());
 }
 
 Outcome MarkerTracker::firstFrame() {

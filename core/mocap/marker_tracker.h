@@ -1,5 +1,6 @@
 #pragma once
 
+#include <limits>
 #include <optional>
 #include <string>
 
@@ -61,7 +62,7 @@ class MarkerTracker {
   MarkerTracker(std::shared_ptr<const Submanifold> submanifold, std::vector<MarkerSite> sites, MarkerTrackerOptions options);
 
   /// Estimates the size of the subject from several frames, before the first fit(): the geometric mean of what each of them
-  /// says on its own, weighted by the inverse square of the fitting energy (22) that it ends with. A frame that the model
+  /// says on its own, weighted by the inverse square of the robust fitting energy that it ends with. A frame that the model
   /// does not explain, or that was aligned wrongly, hardly counts. Nothing changes where a scale was given or no frame converges; then the first fitted frame tells the size.
   /// Throws InvalidInput naming calibration[i] when that frame has not L rows or does not determine a placement.
   Outcome calibrate(const std::vector<MarkerPositions>& frames);
@@ -84,7 +85,6 @@ class MarkerTracker {
 
   void takeMarkers(const MarkerPositions& markers, const std::string& field);
   bool placeable();
-  double fittingEnergy() const;
   Vertices modelPoints(const Vertices& shape) const;
   Eigen::Vector3d offsetOn(const Vertices& shape, const MarkerSite& site) const;
   void followRigidly();
@@ -101,7 +101,7 @@ class MarkerTracker {
   double robustEnergy(double distance) const;
   Outcome round(bool estimate_scale);
   bool lookAhead(const ProjectionAccelerator& accelerator, ProjectionAccelerator::State& start);
-  Outcome alternate(bool estimate_scale);
+  Outcome alternate(bool estimate_scale, double hopeless_energy = std::numeric_limits<double>::infinity());
   Outcome firstFrame();
   Outcome nextFrame();
   MarkerFit report() const;

@@ -4,9 +4,9 @@
 #include <mutex>
 #include <optional>
 
+#include "core/markers/marker_set.h"
 #include "core/mesh/anchor.h"
 #include "core/mesh/prolongation.h"
-#include "core/mocap/marker_set.h"
 #include "core/mocap/marker_tracker.h"
 #include "core/statistics/submanifold.h"
 

@@ -5,8 +5,8 @@
 #include <string>
 #include <vector>
 
-#include "core/mocap/marker_set.h"
-#include "core/mocap/marker_trial.h"
+#include "core/markers/marker_set.h"
+#include "core/markers/marker_trial.h"
 #include "core/sample/creature.h"
 
 namespace shaped {

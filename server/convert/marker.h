@@ -3,8 +3,8 @@
 #include <string>
 #include <vector>
 
+#include "core/markers/marker_set.h"
 #include "core/mesh/types.h"
-#include "core/mocap/marker_set.h"
 #include "shaped/v1/motion.pb.h"
 
 namespace shaped::server {

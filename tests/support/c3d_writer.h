@@ -5,7 +5,7 @@
 #include <string>
 
 #include "core/io/c3d_numbers.h"
-#include "core/mocap/marker_trial.h"
+#include "core/markers/marker_trial.h"
 
 namespace shaped::test {
 

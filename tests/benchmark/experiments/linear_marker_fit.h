@@ -1,7 +1,7 @@
 #pragma once
 
+#include "core/markers/marker_trial.h"
 #include "core/mesh/alignment.h"
-#include "core/mocap/marker_trial.h"
 #include "core/statistics/linear_pca.h"
 
 namespace shaped::experiments {

@@ -5,8 +5,8 @@
 #include "core/io/marker_file.h"
 #include "core/io/marker_set_file.h"
 #include "core/model/marker_fitter.h"
-#include "tests/benchmark/experiments/experiment.h"
 #include "tests/benchmark/experiments/calibration.h"
+#include "tests/benchmark/experiments/experiment.h"
 #include "tests/benchmark/experiments/models.h"
 #include "tests/benchmark/experiments/timing.h"
 

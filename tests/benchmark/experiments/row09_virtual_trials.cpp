@@ -3,9 +3,9 @@
 #include "core/io/marker_set_file.h"
 #include "core/mesh/quality.h"
 #include "core/model/marker_fitter.h"
+#include "tests/benchmark/experiments/calibration.h"
 #include "tests/benchmark/experiments/experiment.h"
 #include "tests/benchmark/experiments/linear_marker_fit.h"
-#include "tests/benchmark/experiments/calibration.h"
 #include "tests/benchmark/experiments/models.h"
 #include "tests/benchmark/experiments/timing.h"
 

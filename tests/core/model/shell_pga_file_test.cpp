@@ -1,0 +1,84 @@
+#include "core/model/shell_pga_file.h"
+
+#include <catch2/catch.hpp>
+#include <limits>
+
+#include "core/io/file_error.h"
+#include "tests/support/models.h"
+#include "tests/support/temporary_folder.h"
+
+using namespace shaped;
+using namespace shaped::test;
+
+namespace {
+
+ShellPgaModelPtr throughFile(const ShellPgaModel& model) {
+  const TemporaryFolder folder;
+  const ModelDirectory directory(folder.path());
+  publishShellPga(directory, "m", model);
+  return loadShellPga(directory.load("m"));
+}
+
+}  // namespace
+
+TEST_CASE("a model comes back from its file bit for bit") {
+  const auto& model = *tubeModel();
+  const auto loaded = throughFile(model);
+  const auto &before = model.parts(), &after = loaded->parts();
+  CHECK(after.topology->id() == before.topology->id());
+  CHECK(after.coarsening.kept == before.coarsening.kept);
+  CHECK(after.coarsening.coarse->faces() == before.coarsening.coarse->faces());
+  CHECK(after.template_shape == before.template_shape);
+  CHECK(after.reference == before.reference);
+  CHECK(Eigen::MatrixXd(after.detail) == Eigen::MatrixXd(before.detail));
+  CHECK(after.bending == before.bending);
+  CHECK(after.symmetry == before.symmetry);
+  CHECK(after.pga.mean == before.pga.mean);
+  CHECK(after.pga.eigenvalues == before.pga.eigenvalues);
+  CHECK(after.pga.eigenvectors == before.pga.eigenvectors);
+  CHECK(after.pga.variations == before.pga.variations);
+  CHECK(after.pga.path_steps == before.pga.path_steps);
+  CHECK(after.training.mean.iterations == before.training.mean.iterations);
+  CHECK(after.training.mean.residual == before.training.mean.residual);
+  CHECK(loaded->mean() == model.mean());
+}
+
+TEST_CASE("a model keeps its path energy, and one from before there was a choice is directed") {
+  auto parts = tubeModel()->parts();
+  parts.symmetry = EnergySymmetry::kDirected;
+  CHECK(throughFile(ShellPgaModel(parts))->parts().symmetry == EnergySymmetry::kDirected);
+
+  const TemporaryFolder folder;
+  const ModelDirectory directory(folder.path());
+  publishShellPga(directory, "m", *tubeModel());
+  auto stored = directory.load("m");
+  stored.manifest.description.erase("path_energy");
+  CHECK(loadShellPga(stored)->parts().symmetry == EnergySymmetry::kDirected);
+  stored.manifest.description["path_energy"] = "sideways";
+  CHECK_THROWS_WITH(loadShellPga(stored), Catch::Contains("model m version 1") && Catch::Contains("path_energy"));
+}
+
+TEST_CASE("a model whose training ended without a finite residual can be loaded again") {
+  auto parts = tubeModel()->parts();
+  parts.training.mean = {Termination::kNumericalFailure, 3, std::numeric_limits<double>::quiet_NaN()};
+  const auto loaded = throughFile(ShellPgaModel(parts));
+  CHECK(loaded->parts().training.mean.termination == Termination::kNumericalFailure);
+  CHECK(!std::isfinite(loaded->parts().training.mean.residual));
+}
+
+TEST_CASE("files of another kind or version, and faulty descriptions, are refused by name") {
+  const TemporaryFolder folder;
+  const ModelDirectory directory(folder.path());
+  publishShellPga(directory, "m", *tubeModel());
+  const auto stored = directory.load("m");
+  const auto refused = [&](const std::function<void(StoredModel&)>& change, const std::string& reason) {
+    auto changed = stored;
+    change(changed);
+    CHECK_THROWS_AS(loadShellPga(changed), FileError);
+    CHECK_THROWS_WITH(loadShellPga(changed), Catch::Contains("model m version 1") && Catch::Contains(reason));
+  };
+  refused([](StoredModel& m) { m.manifest.kind = "linear"; }, "linear");
+  refused([](StoredModel& m) { m.manifest.format_version = 99; }, "format version 99");
+  refused([](StoredModel& m) { m.manifest.description.erase("bending"); }, "bending");
+  refused([](StoredModel& m) { m.manifest.description["path_steps"] = "four"; }, "description");
+}
