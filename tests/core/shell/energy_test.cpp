@@ -2,8 +2,8 @@
 
 #include <Eigen/Eigenvalues>
 #include <catch2/catch.hpp>
-#include <functional>
 
+#include "tests/support/finite_differences.h"
 #include "tests/support/literal_shell_energy.h"
 #include "tests/support/shapes.h"
 
@@ -65,18 +65,6 @@ Eigen::MatrixXd mixedOf(const ShellStructure& structure, const Vertices& s, cons
   return Eigen::MatrixXd(matrix.toSparse());
 }
 
-/// Central differences of a vector function of a shape, one column per coordinate.
-Eigen::MatrixXd differences(const Vertices& at, double step, const std::function<Eigen::VectorXd(const Vertices&)>& f) {
-  Eigen::MatrixXd result(f(at).size(), at.size());
-  for (Eigen::Index i = 0; i < at.size(); ++i) {
-    Vertices plus = at, minus = at;
-    plus.data()[i] += step;
-    minus.data()[i] -= step;
-    result.col(i) = (f(plus) - f(minus)) / (2 * step);
-  }
-  return result;
-}
-
 double relativeError(const Eigen::MatrixXd& value, const Eigen::MatrixXd& reference, double floor) {
   return (value - reference).norm() / std::max(reference.norm(), floor);
 }
@@ -97,8 +85,8 @@ TEST_CASE("shell gradients match central differences in both arguments") {
     const auto value = [&mesh = mesh](const Vertices& a, const Vertices& b) {
       return Eigen::VectorXd::Constant(1, shellEnergy(*mesh.topology, a, b, kEta));
     };
-    const auto first = differences(s, 1e-6, [&, &t = t](const Vertices& x) { return value(x, t); });
-    const auto second = differences(t, 1e-6, [&, &s = s](const Vertices& x) { return value(s, x); });
+    const auto first = differenceJacobian([&, &t = t](const Vertices& x) { return value(x, t); }, s, 1e-6);
+    const auto second = differenceJacobian([&, &s = s](const Vertices& x) { return value(s, x); }, t, 1e-6);
     CHECK(relativeError(flat(gradientOf(mesh, s, t, true)).transpose(), first, 1) < 1e-7);
     CHECK(relativeError(flat(gradientOf(mesh, s, t, false)).transpose(), second, 1) < 1e-7);
   }
@@ -111,9 +99,9 @@ TEST_CASE("shell Hessians match central differences of the gradients: first, sec
     const auto gradient = [&mesh = mesh](const Vertices& a, const Vertices& b, bool first) {
       return Eigen::VectorXd(flat(gradientOf(mesh, a, b, first)));
     };
-    const auto first = differences(s, 1e-6, [&, &t = t](const Vertices& x) { return gradient(x, t, true); });
-    const auto second = differences(t, 1e-6, [&, &s = s](const Vertices& x) { return gradient(s, x, false); });
-    const auto mixed = differences(t, 1e-6, [&, &s = s](const Vertices& x) { return gradient(s, x, true); });
+    const auto first = differenceJacobian([&, &t = t](const Vertices& x) { return gradient(x, t, true); }, s, 1e-6);
+    const auto second = differenceJacobian([&, &s = s](const Vertices& x) { return gradient(s, x, false); }, t, 1e-6);
+    const auto mixed = differenceJacobian([&, &s = s](const Vertices& x) { return gradient(s, x, true); }, t, 1e-6);
     CHECK(relativeError(hessianOf(structure, s, t, true), first, 1) < 1e-6);
     CHECK(relativeError(hessianOf(structure, s, t, false), second, 1) < 1e-6);
     CHECK(relativeError(mixedOf(structure, s, t), mixed, 1) < 1e-6);

@@ -2,8 +2,8 @@
 
 #include <Eigen/Dense>
 #include <catch2/catch.hpp>
-#include <functional>
 
+#include "tests/support/finite_differences.h"
 #include "tests/support/literal_shell_energy.h"
 #include "tests/support/shapes.h"
 
@@ -40,19 +40,6 @@ struct Pair {
   }
 };
 
-/// Central differences of a vector function of a shape, one column per coordinate.
-Eigen::MatrixXd differences(const Vertices& at, const std::function<Eigen::VectorXd(const Vertices&)>& f) {
-  constexpr double step = 1e-6;
-  Eigen::MatrixXd result(f(at).size(), at.size());
-  for (Eigen::Index i = 0; i < at.size(); ++i) {
-    Vertices plus = at, minus = at;
-    plus.data()[i] += step;
-    minus.data()[i] -= step;
-    result.col(i) = (f(plus) - f(minus)) / (2 * step);
-  }
-  return result;
-}
-
 double relativeGap(const Eigen::MatrixXd& value, const Eigen::MatrixXd& reference) {
   return (value - reference).norm() / reference.norm();
 }
@@ -80,8 +67,8 @@ TEST_CASE("pair energy gradients and Hessians match central differences") {
     const auto gradient = [&](const Vertices& a, const Vertices& b, bool first) {
       return pair.gradient(symmetry, a, b, first);
     };
-    const auto by_a = differences(pair.a, [&](const Vertices& x) { return value(x, pair.b); });
-    const auto by_b = differences(pair.b, [&](const Vertices& x) { return value(pair.a, x); });
+    const auto by_a = differenceJacobian([&](const Vertices& x) { return value(x, pair.b); }, pair.a, 1e-6);
+    const auto by_b = differenceJacobian([&](const Vertices& x) { return value(pair.a, x); }, pair.b, 1e-6);
     CHECK(relativeGap(gradient(pair.a, pair.b, true).transpose(), by_a) < 1e-7);
     CHECK(relativeGap(gradient(pair.a, pair.b, false).transpose(), by_b) < 1e-7);
 
@@ -94,14 +81,14 @@ TEST_CASE("pair energy gradients and Hessians match central differences") {
       else
         energy.addSecondCurvature(*pair.mesh.topology, pair.of(pair.a), pair.of(pair.b), 1, curvature);
       pullBackHessian(structure, first ? pair.a : pair.b, curvature, hessian);
-      const auto expected = differences(first ? pair.a : pair.b, [&](const Vertices& x) {
+      const auto expected = differenceJacobian([&](const Vertices& x) {
         return first ? gradient(x, pair.b, true) : gradient(pair.a, x, false);
-      });
+      }, first ? pair.a : pair.b, 1e-6);
       CHECK(relativeGap(Eigen::MatrixXd(hessian.toSparse()), expected) < 1e-6);
     }
     GeneralBlockMatrix mixed(structure.pattern());
     energy.addMixedHessian(structure, pair.a, pair.of(pair.a), pair.b, pair.of(pair.b), 1, mixed);
-    const auto expected = differences(pair.b, [&](const Vertices& x) { return gradient(pair.a, x, true); });
+    const auto expected = differenceJacobian([&](const Vertices& x) { return gradient(pair.a, x, true); }, pair.b, 1e-6);
     CHECK(relativeGap(Eigen::MatrixXd(mixed.toSparse()), expected) < 1e-6);
   }
 }
