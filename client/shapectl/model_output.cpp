@@ -18,10 +18,13 @@ nlohmann::json toJson(const v1::ModelDescription& description) {
   addModel(document, description.model());
   addReport(document["training"], description.training());
   const auto& pga = description.shell_pga();
-  document["shell_pga"] = {
-      {"training_shapes", pga.training_shapes()}, {"modes", pga.modes()},     {"path_steps", pga.path_steps()},
-      {"coarse_vertices", pga.coarse_vertices()}, {"bending", pga.bending()},
-      {"path_energy", pathEnergyText(pga.path_energy())}, {"eigenvalues", pga.eigenvalues()}};
+  document["shell_pga"] = {{"training_shapes", pga.training_shapes()},
+                           {"modes", pga.modes()},
+                           {"path_steps", pga.path_steps()},
+                           {"coarse_vertices", pga.coarse_vertices()},
+                           {"bending", pga.bending()},
+                           {"path_energy", pathEnergyText(pga.path_energy())},
+                           {"eigenvalues", pga.eigenvalues()}};
   return document;
 }
 

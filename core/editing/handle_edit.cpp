@@ -19,9 +19,14 @@ Vertices wantedPositions(const std::vector<AnchorTarget>& handles) {
 
 class HandleEditor {
  public:
-  HandleEditor(const Submanifold& submanifold, const std::vector<AnchorTarget>& handles, const HandleEditOptions& options)
-      : submanifold_(submanifold), calculus_(submanifold.calculus()), handles_(handles), options_(options),
-        wanted_(wantedPositions(handles)), size_(boundingBoxDiagonal(submanifold.pga().mean)),
+  HandleEditor(const Submanifold& submanifold, const std::vector<AnchorTarget>& handles,
+               const HandleEditOptions& options)
+      : submanifold_(submanifold),
+        calculus_(submanifold.calculus()),
+        handles_(handles),
+        options_(options),
+        wanted_(wantedPositions(handles)),
+        size_(boundingBoxDiagonal(submanifold.pga().mean)),
         accelerator_(submanifold) {}
 
   Solved<HandleEdit> run();
@@ -98,7 +103,8 @@ Outcome HandleEditor::approach() {
 }
 
 /// min over s of W[s, prior] with the handles met: shifting the targets by the accumulated misses is the augmented
-/// Lagrangian's multiplier update. The multipliers hardly change from round to round, so each starts with the last ones.
+/// Lagrangian's multiplier update. The multipliers hardly change from round to round, so each starts with the last
+/// ones.
 Outcome HandleEditor::meetHandles(const Vertices& prior, Vertices& shape) {
   Outcome outcome;
   for (int update = 0; update < 30; ++update) {
@@ -196,7 +202,8 @@ Solved<HandleEdit> editByHandles(const Submanifold& submanifold, const std::vect
   auto weighted = handles;
   for (auto& handle : weighted) handle.weight = 1;
   if (!determinePlacement(weighted))
-    throw InvalidInput("handles", "are fewer than three or lie on one line; they must determine where the shape stands");
+    throw InvalidInput("handles",
+                       "are fewer than three or lie on one line; they must determine where the shape stands");
   return HandleEditor(submanifold, handles, options).run();
 }
 

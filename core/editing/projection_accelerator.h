@@ -25,8 +25,8 @@ class ProjectionAccelerator {
   /// Remembers that a round which started at `input` ended at `output`.
   void add(const State& input, const State& output);
 
-  /// Where the iteration seems to go; empty while there are not two steps to tell. The proposal lies at most thirty times
-  /// the last step away.
+  /// Where the iteration seems to go; empty while there are not two steps to tell. The proposal lies at most thirty
+  /// times the last step away.
   std::optional<State> propose() const;
 
   /// Drops what was remembered.

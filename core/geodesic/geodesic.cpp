@@ -100,7 +100,8 @@ Solved<Path> GeodesicCalculus::interpolate(const Vertices& a, const Vertices& b,
     // inner shapes follow the end by their share of its displacement
     const Vertices displacement = aligned(b, warm.back()) - warm.back();
     Path path = warm;
-    for (int k = 1; k < steps; ++k) path[static_cast<std::size_t>(k)] += (static_cast<double>(k) / steps) * displacement;
+    for (int k = 1; k < steps; ++k)
+      path[static_cast<std::size_t>(k)] += (static_cast<double>(k) / steps) * displacement;
     if (!std::isfinite(pathEnergy(path)) || pathEnergy(path) > 2 * pathEnergy(warm)) path = warm;
     path.front() = a;
     path.back() = b;

@@ -52,8 +52,8 @@ class GeodesicCalculus {
   /// The shape between two neighbours that minimises (1 - t) W[a, s] + t W[s, b], equation (24); t in [0, 1].
   Solved<Vertices> between(const Vertices& a, const Vertices& b, double t, const GeodesicOptions& options) const;
 
-  /// The inverse of (24): the shape b of which between(a, b, t) is `inner`, (1 - t) W,2[a, inner] + t W,1[inner, b] = 0;
-  /// t in (0, 1].
+  /// The inverse of (24): the shape b of which between(a, b, t) is `inner`, (1 - t) W,2[a, inner] + t W,1[inner, b] =
+  /// 0; t in (0, 1].
   Solved<Vertices> through(const Vertices& a, const Vertices& inner, double t, const GeodesicOptions& options) const;
 
   /// K sum_k W[s_{k-1}, s_k], the squared distance of the ends when the path is a geodesic [m^2].

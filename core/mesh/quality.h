@@ -26,8 +26,8 @@ Vertices vertexNormals(const Faces& faces, const Vertices& vertices);
 
 /// Length of the diagonal of the axis-aligned bounding box, metres; 0 without vertices.
 double boundingBoxDiagonal(const Vertices& vertices);
-/// Largest distance between two vertices, metres; 0 without vertices. Unlike the box it does not change with the pose in
-/// space.
+/// Largest distance between two vertices, metres; 0 without vertices. Unlike the box it does not change with the pose
+/// in space.
 double diameter(const Vertices& vertices);
 
 /// Distances between corresponding vertices of two shapes, metres, as they stand (no alignment).

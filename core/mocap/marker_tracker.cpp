@@ -39,7 +39,9 @@ std::optional<std::string> MarkerTrackerOptions::firstViolation() const {
 
 MarkerTracker::MarkerTracker(std::shared_ptr<const Submanifold> submanifold, std::vector<MarkerSite> sites,
                              MarkerTrackerOptions options)
-    : submanifold_(std::move(submanifold)), sites_(std::move(sites)), options_(std::move(options)),
+    : submanifold_(std::move(submanifold)),
+      sites_(std::move(sites)),
+      options_(std::move(options)),
       size_(boundingBoxDiagonal(submanifold_->pga().mean)) {
   state_.shape = state_.prior = submanifold_->pga().mean;
   if (const auto violation = options_.firstViolation()) throw InvalidInput("options", *violation);
@@ -52,7 +54,8 @@ MarkerTracker::MarkerTracker(std::shared_ptr<const Submanifold> submanifold, std
 Eigen::Vector3d MarkerTracker::offsetOn(const Vertices& shape, const MarkerSite& site) const {
   if (site.offset.isZero()) return Eigen::Vector3d::Zero();
   Vertices patch(static_cast<Eigen::Index>(site.patch.size()), 3);
-  for (std::size_t i = 0; i < site.patch.size(); ++i) patch.row(static_cast<Eigen::Index>(i)) = shape.row(site.patch[i]);
+  for (std::size_t i = 0; i < site.patch.size(); ++i)
+    patch.row(static_cast<Eigen::Index>(i)) = shape.row(site.patch[i]);
   return alignRigidly(site.patch_template, patch).rotation * site.offset;
 }
 
@@ -68,7 +71,7 @@ Vertices MarkerTracker::modelPoints(const Vertices& shape) const {
 void MarkerTracker::takeMarkers(const MarkerPositions& markers, const std::string& field) {
   if (markers.rows() != static_cast<Eigen::Index>(sites_.size()))
     throw InvalidInput(field, "has " + std::to_string(markers.rows()) + " rows, the marker set has " +
-                                      std::to_string(sites_.size()) + " markers");
+                                  std::to_string(sites_.size()) + " markers");
   state_.targets.clear();
   state_.markers = Vertices::Zero(markers.rows(), 3);
   for (std::size_t l = 0; l < sites_.size(); ++l) {
@@ -80,7 +83,10 @@ void MarkerTracker::takeMarkers(const MarkerPositions& markers, const std::strin
 }
 
 /// Moves the shape by the rigid motion that brings its marker points to the markers.
-void MarkerTracker::followRigidly() { state_.shape = apply(alignRigidly(modelPoints(state_.shape), state_.markers, weightsOf(state_.targets)), state_.shape); }
+void MarkerTracker::followRigidly() {
+  state_.shape =
+      apply(alignRigidly(modelPoints(state_.shape), state_.markers, weightsOf(state_.targets)), state_.shape);
+}
 
 /// Geman-McClure weights (c^2 / (c^2 + r^2))^2 of the current residuals, c the distance.
 void MarkerTracker::updateWeights(double distance) {
@@ -101,15 +107,16 @@ double MarkerTracker::medianResidual() const {
   std::vector<double> residuals;
   for (std::size_t l = 0; l < state_.targets.size(); ++l)
     if (seen(state_.targets[l]))
-      residuals.push_back((points.row(static_cast<Eigen::Index>(l)) - state_.markers.row(static_cast<Eigen::Index>(l))).norm());
+      residuals.push_back(
+          (points.row(static_cast<Eigen::Index>(l)) - state_.markers.row(static_cast<Eigen::Index>(l))).norm());
   return median(std::move(residuals));
 }
 
 /// For residuals that the pose may still cause.
 double MarkerTracker::tolerantDistance() const { return std::max(robustDistance(), 3 * medianResidual()); }
 
-/// Brings the mean to the markers. Reweighted until outliers no longer pull: a single gross one would turn and shrink the
-/// model beyond what the rounds that follow could mend.
+/// Brings the mean to the markers. Reweighted until outliers no longer pull: a single gross one would turn and shrink
+/// the model beyond what the rounds that follow could mend.
 void MarkerTracker::place(bool estimate_scale) {
   state_.shape = state_.prior = submanifold_->pga().mean;
   state_.projection = {};
@@ -123,8 +130,8 @@ void MarkerTracker::place(bool estimate_scale) {
   }
 }
 
-/// Median ratio of the distances between neighbouring markers to those between their points on the shape. Neighbours sit
-/// mostly on one part of the body, so neither the pose nor a few outliers change it.
+/// Median ratio of the distances between neighbouring markers to those between their points on the shape. Neighbours
+/// sit mostly on one part of the body, so neither the pose nor a few outliers change it.
 double MarkerTracker::neighbourRatio() const {
   constexpr std::size_t neighbours = 5;
   const Vertices points = modelPoints(state_.shape);
@@ -135,13 +142,14 @@ double MarkerTracker::neighbourRatio() const {
     for (std::size_t m = 0; m < state_.targets.size(); ++m) {
       const auto other = static_cast<Eigen::Index>(m);
       if (m == l || !seen(state_.targets[l]) || !seen(state_.targets[m])) continue;
-      distances.emplace_back((points.row(row) - points.row(other)).norm(), (state_.markers.row(row) - state_.markers.row(other)).norm());
+      distances.emplace_back((points.row(row) - points.row(other)).norm(),
+                             (state_.markers.row(row) - state_.markers.row(other)).norm());
     }
     std::sort(distances.begin(), distances.end());
     for (std::size_t k = 0; k < std::min(neighbours, distances.size()); ++k)
-      ratios.push_back(distances[k].second / distances[k].first);
+      if (distances[k].first > 0) ratios.push_back(distances[k].second / distances[k].first);
   }
-  return median(std::move(ratios));
+  return ratios.empty() ? 1 : median(std::move(ratios));
 }
 
 /// The size of the subject: of the markers against their points on the projection, which the markers do not stretch.
@@ -160,7 +168,8 @@ void MarkerTracker::rescale(double ratio) {
 /// min over s for fixed P[s]; offsets keep the direction they have on the shape at hand.
 Outcome MarkerTracker::fitShape() {
   for (std::size_t l = 0; l < state_.targets.size(); ++l)
-    state_.targets[l].position = state_.markers.row(static_cast<Eigen::Index>(l)).transpose() - offsetOn(state_.shape, sites_[l]);
+    state_.targets[l].position =
+        state_.markers.row(static_cast<Eigen::Index>(l)).transpose() - offsetOn(state_.shape, sites_[l]);
   auto fit = fitAnchored(submanifold_->calculus(), state_.prior, state_.targets, state_.shape,
                          {options_.prior_weight, 60, 1e-5, options_.submanifold.stop});
   if (fit.termination != Termination::kNumericalFailure) state_.shape = std::move(fit.solution);
@@ -168,7 +177,8 @@ Outcome MarkerTracker::fitShape() {
 }
 
 Outcome MarkerTracker::projectShape() {
-  auto projected = submanifold_->project(state_.shape, options_.submanifold, state_.projection.geodesic.empty() ? nullptr : &state_.projection);
+  auto projected = submanifold_->project(state_.shape, options_.submanifold,
+                                         state_.projection.geodesic.empty() ? nullptr : &state_.projection);
   if (projected.converged()) {
     state_.projection = std::move(projected.solution);
     state_.prior = state_.projection.shape;
@@ -215,12 +225,14 @@ bool MarkerTracker::lookAhead(const ProjectionAccelerator& accelerator, Projecti
   return true;
 }
 
-/// From the mean, placed by the markers: rounds of shape and projection, accelerated, until their energy settles; or, after
-/// some, while it is above `hopeless_energy`.
+/// From the mean, placed by the markers: rounds of shape and projection, accelerated, until their energy settles; or,
+/// after some, while it is above `hopeless_energy`.
 Outcome MarkerTracker::alternate(bool estimate_scale, double hopeless_energy) {
   place(estimate_scale);
   ProjectionAccelerator accelerator(*submanifold_);
-  const auto state = [&] { return ProjectionAccelerator::State{state_.projection.point, size_ * std::log(state_.scale)}; };
+  const auto state = [&] {
+    return ProjectionAccelerator::State{state_.projection.point, size_ * std::log(state_.scale)};
+  };
   state_.projection.point = submanifold_->pointOf(Eigen::VectorXd::Zero(submanifold_->pga().modes()));
   Outcome total;
   auto last = state_;
@@ -249,7 +261,8 @@ Outcome MarkerTracker::alternate(bool estimate_scale, double hopeless_energy) {
 
 /// Do the markers seen determine where the shape stands?
 bool MarkerTracker::placeable() {
-  for (std::size_t l = 0; l < state_.targets.size(); ++l) state_.targets[l].position = state_.markers.row(static_cast<Eigen::Index>(l));
+  for (std::size_t l = 0; l < state_.targets.size(); ++l)
+    state_.targets[l].position = state_.markers.row(static_cast<Eigen::Index>(l));
   return determinePlacement(state_.targets);
 }
 

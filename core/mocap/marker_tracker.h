@@ -17,16 +17,17 @@ using MarkerPositions = Vertices;
 ///
 /// The patch is wide enough to turn steadily; hung on a single triangle, a marker on a bar would wring that triangle.
 struct MarkerSite {
-  Anchor skin;                                        ///< the point on the surface
-  Eigen::Vector3d offset = Eigen::Vector3d::Zero();   ///< from there to the marker, in the axes of the template [m]
-  std::vector<std::int32_t> patch;                    ///< vertices around it; not needed where the offset is zero
-  Vertices patch_template;                            ///< their positions on the template
+  Anchor skin;                                       ///< the point on the surface
+  Eigen::Vector3d offset = Eigen::Vector3d::Zero();  ///< from there to the marker, in the axes of the template [m]
+  std::vector<std::int32_t> patch;                   ///< vertices around it; not needed where the offset is zero
+  Vertices patch_template;                           ///< their positions on the template
 };
 
 struct MarkerTrackerOptions {
-  double prior_weight = 1;      ///< gamma of (22), > 0
-  double robust_scale = 0.05;   ///< distance at which a marker's pull is quartered, over the model's size; 0 = least squares
-  int alternations = 1;         ///< projections a frame after the first, >= 1
+  double prior_weight = 1;  ///< gamma of (22), > 0
+  double robust_scale =
+      0.05;              ///< distance at which a marker's pull is quartered, over the model's size; 0 = least squares
+  int alternations = 1;  ///< projections a frame after the first, >= 1
   int first_alternations = 30;  ///< at most, in the first frame, >= 1
   std::optional<double> scale;  ///< size of the subject over that of the model; estimated where not given
   /// Looser than elsewhere: the markers' own error is far above what this costs.
@@ -38,33 +39,35 @@ struct MarkerTrackerOptions {
 
 /// One fitted frame.
 struct MarkerFit {
-  Vertices shape;                    ///< s, placed and scaled as the markers
-  Vertices projection;               ///< P[s], likewise
-  SubmanifoldPoint point;            ///< of the projection
-  Eigen::VectorXd residuals;         ///< per marker, distance to its point on the shape [m]; NaN where not seen
-  Eigen::VectorXd weights;           ///< per marker, of the robust loss, in [0, 1]; 0 where not seen
-  double rms = 0;                    ///< over the markers seen [m]
-  double scale = 1;                  ///< of the model
-  double prior_energy = 0;           ///< W[s, P[s]] of the unscaled shapes [m^2]
-  bool held = false;                 ///< too few markers were seen: the last frame's shape is repeated
+  Vertices shape;             ///< s, placed and scaled as the markers
+  Vertices projection;        ///< P[s], likewise
+  SubmanifoldPoint point;     ///< of the projection
+  Eigen::VectorXd residuals;  ///< per marker, distance to its point on the shape [m]; NaN where not seen
+  Eigen::VectorXd weights;    ///< per marker, of the robust loss, in [0, 1]; 0 where not seen
+  double rms = 0;             ///< over the markers seen [m]
+  double scale = 1;           ///< of the model
+  double prior_energy = 0;    ///< W[s, P[s]] of the unscaled shapes [m^2]
+  bool held = false;          ///< too few markers were seen: the last frame's shape is repeated
 };
 
 /// Fits a sequence of marker frames by the alternating scheme for (22) of [HZRS18]: s for fixed P[s], then P[s]; each
-/// frame starts from the last one. The first frame, and each that calibrates the size, is placed and scaled by a robust similarity of the mean's marker points.
-/// While a shape has yet to follow its markers, they are judged outliers at three times their median residual; after that
-/// at the robust scale.
+/// frame starts from the last one. The first frame, and each that calibrates the size, is placed and scaled by a robust
+/// similarity of the mean's marker points. While a shape has yet to follow its markers, they are judged outliers at
+/// three times their median residual; after that at the robust scale.
 ///
 /// Keeps the state of one sequence; one object per sequence and thread.
 class MarkerTracker {
  public:
-  /// sites: where the markers sit on the model's coarse mesh, at least three. Throws InvalidInput naming "marker_set" or
-  /// the option at fault.
-  MarkerTracker(std::shared_ptr<const Submanifold> submanifold, std::vector<MarkerSite> sites, MarkerTrackerOptions options);
+  /// sites: where the markers sit on the model's coarse mesh, at least three. Throws InvalidInput naming "marker_set"
+  /// or the option at fault.
+  MarkerTracker(std::shared_ptr<const Submanifold> submanifold, std::vector<MarkerSite> sites,
+                MarkerTrackerOptions options);
 
-  /// Estimates the size of the subject from several frames, before the first fit(): the geometric mean of what each of them
-  /// says on its own, weighted by the inverse square of the robust fitting energy that it ends with. A frame that the model
-  /// does not explain, or that was aligned wrongly, hardly counts. Nothing changes where a scale was given or no frame converges; then the first fitted frame tells the size.
-  /// Throws InvalidInput naming calibration[i] when that frame has not L rows or does not determine a placement.
+  /// Estimates the size of the subject from several frames, before the first fit(): the geometric mean of what each of
+  /// them says on its own, weighted by the inverse square of the robust fitting energy that it ends with. A frame that
+  /// the model does not explain, or that was aligned wrongly, hardly counts. Nothing changes where a scale was given or
+  /// no frame converges; then the first fitted frame tells the size. Throws InvalidInput naming calibration[i] when
+  /// that frame has not L rows or does not determine a placement.
   Outcome calibrate(const std::vector<MarkerPositions>& frames);
 
   /// Fits the next frame. Throws InvalidInput naming "markers" when the frame has not L rows, or when it is the first
@@ -80,7 +83,7 @@ class MarkerTracker {
     Vertices shape;                     ///< s, unscaled, placed as the scaled-down markers
     Vertices prior;                     ///< P[s]
     SubmanifoldProjection projection;
-    double energy = 0;                  ///< robustEnergy() at the end of a round
+    double energy = 0;  ///< robustEnergy() at the end of a round
   };
 
   void takeMarkers(const MarkerPositions& markers, const std::string& field);

@@ -7,13 +7,13 @@ namespace shaped {
 
 /// A fitted frame at full resolution.
 struct FittedFrame {
-  Vertices shape;                   ///< V x 3, placed and scaled as the markers
-  MarkerFit fit;                    ///< residuals, weights, scale, coarse shapes
-  double smallest_area_ratio = 1;   ///< of the unscaled shape against the mean
+  Vertices shape;                  ///< V x 3, placed and scaled as the markers
+  MarkerFit fit;                   ///< residuals, weights, scale, coarse shapes
+  double smallest_area_ratio = 1;  ///< of the unscaled shape against the mean
 };
 
-/// Fits a marker sequence with a model, frame by frame, each started from the last (MarkerTracker). Holds the model; one
-/// object per sequence and thread.
+/// Fits a marker sequence with a model, frame by frame, each started from the last (MarkerTracker). Holds the model;
+/// one object per sequence and thread.
 class MarkerFitter {
  public:
   /// Throws InvalidInput when a marker does not fit the model's topology, there are fewer than three, or an option is

@@ -21,8 +21,8 @@ std::vector<int> chosenModes(const ShellPgaModel& model, const EvaluationOptions
     for (int step = 1, m = 1; m <= largest; step = std::max(1, m / 2), m += step) modes.push_back(m);
   for (std::size_t i = 0; i < modes.size(); ++i)
     if (modes[i] < 1 || modes[i] > std::min(largest, model.modes()))
-      throw InvalidInput("modes[" + std::to_string(i) + "]", std::to_string(modes[i]) + ", want 1 to " +
-                                                                 std::to_string(std::min(largest, model.modes())));
+      throw InvalidInput("modes[" + std::to_string(i) + "]",
+                         std::to_string(modes[i]) + ", want 1 to " + std::to_string(std::min(largest, model.modes())));
   return modes;
 }
 
@@ -37,7 +37,12 @@ class FoldEvaluator {
  public:
   FoldEvaluator(const ShellPgaModel& model, const std::vector<Vertices>& shapes, const Spider& spider,
                 const std::vector<int>& modes, const EvaluationOptions& options)
-      : model_(model), calculus_(model.submanifold().calculus()), shapes_(shapes), spider_(spider), modes_(modes), options_(options) {}
+      : model_(model),
+        calculus_(model.submanifold().calculus()),
+        shapes_(shapes),
+        spider_(spider),
+        modes_(modes),
+        options_(options) {}
 
   Outcome run(std::size_t fold, std::size_t folds, ShellPgaEvaluation& sums) const {
     std::vector<Vertices> kept, left_out;
@@ -56,14 +61,16 @@ class FoldEvaluator {
     const int largest = *std::max_element(modes_.begin(), modes_.end());
     auto pga = principalVariations(calculus_, spider.solution, largest, {100, 1e-8, options_.stop});
     outcome += pga;
-    const Submanifold submanifold(std::make_shared<GeodesicCalculus>(calculus_), std::make_shared<ShellPga>(std::move(pga.solution)));
+    const Submanifold submanifold(std::make_shared<GeodesicCalculus>(calculus_),
+                                  std::make_shared<ShellPga>(std::move(pga.solution)));
     const auto linear = linearPca(kept);
     for (const auto& shape : left_out) outcome += addErrors(submanifold, linear, shape, sums);
     return outcome;
   }
 
  private:
-  Outcome addErrors(const Submanifold& submanifold, const LinearPca& linear, const Vertices& shape, ShellPgaEvaluation& sums) const {
+  Outcome addErrors(const Submanifold& submanifold, const LinearPca& linear, const Vertices& shape,
+                    ShellPgaEvaluation& sums) const {
     std::vector<GeneralisationError> ours(modes_.size()), theirs(modes_.size());
     std::vector<Outcome> outcomes(modes_.size());
     tbb::parallel_for(std::size_t{0}, modes_.size(), [&](std::size_t m) {
@@ -103,7 +110,8 @@ std::vector<double> compactness(const Eigen::VectorXd& eigenvalues, const std::v
 }
 
 /// The mean over random points of the model's Gaussian of the elastic distance to the nearest shape.
-double specificity(const ShellPgaModel& model, const std::vector<Vertices>& shapes, int modes, const EvaluationOptions& options) {
+double specificity(const ShellPgaModel& model, const std::vector<Vertices>& shapes, int modes,
+                   const EvaluationOptions& options) {
   const auto& calculus = model.submanifold().calculus();
   std::mt19937 random(options.seed);
   std::normal_distribution<double> normal;
@@ -113,11 +121,13 @@ double specificity(const ShellPgaModel& model, const std::vector<Vertices>& shap
     for (int j = 0; j < modes; ++j) y[j] = normal(random) * std::sqrt(std::max(model.pga().eigenvalues[j], 0.0));
     SubmanifoldOptions submanifold_options;
     submanifold_options.stop = options.stop;
-    const auto shape = model.submanifold().shapeOf(model.submanifold().pointOf(y), submanifold_options).solution.shape();
+    const auto shape =
+        model.submanifold().shapeOf(model.submanifold().pointOf(y), submanifold_options).solution.shape();
     const auto measures = measure(calculus.topology(), shape);
     double nearest = std::numeric_limits<double>::infinity();
     for (const auto& known : shapes)
-      nearest = std::min(nearest, shellEnergy(calculus.topology(), measure(calculus.topology(), known), measures, calculus.bending()));
+      nearest = std::min(
+          nearest, shellEnergy(calculus.topology(), measure(calculus.topology(), known), measures, calculus.bending()));
     sum += std::sqrt(nearest);
   }
   return sum / std::max(1, options.specificity_samples);
@@ -129,7 +139,8 @@ Solved<ShellPgaEvaluation> evaluate(const ShellPgaModel& model, const std::vecto
                                     const EvaluationOptions& options, const ProgressSink& progress) {
   if (shapes.size() < 3) throw InvalidInput("shapes", "evaluation needs at least three");
   if (options.folds < 0 || options.folds == 1 || options.folds > static_cast<int>(shapes.size()))
-    throw InvalidInput("folds", std::to_string(options.folds) + ", want 0 (leave one out) or 2 to " + std::to_string(shapes.size()));
+    throw InvalidInput(
+        "folds", std::to_string(options.folds) + ", want 0 (leave one out) or 2 to " + std::to_string(shapes.size()));
   const std::size_t folds = options.folds == 0 ? shapes.size() : static_cast<std::size_t>(options.folds);
   const auto smallest_training = static_cast<int>(shapes.size() - (shapes.size() + folds - 1) / folds);
   if (smallest_training < 2)
@@ -142,12 +153,16 @@ Solved<ShellPgaEvaluation> evaluate(const ShellPgaModel& model, const std::vecto
   result.compactness = compactness(model.pga().eigenvalues, result.modes);
 
   std::vector<Vertices> coarse;
-  for (std::size_t i = 0; i < shapes.size(); ++i) coarse.push_back(model.restrict(shapes[i], "shapes[" + std::to_string(i) + "]"));
-  const auto spider = frechetMean(model.submanifold().calculus(), coarse, {model.pga().path_steps, 100, 1e-8, options.stop, {}, nullptr});
+  for (std::size_t i = 0; i < shapes.size(); ++i)
+    coarse.push_back(model.restrict(shapes[i], "shapes[" + std::to_string(i) + "]"));
+  const auto spider = frechetMean(model.submanifold().calculus(), coarse,
+                                  {model.pga().path_steps, 100, 1e-8, options.stop, {}, nullptr});
   Outcome outcome = spider;
   const FoldEvaluator evaluator(model, coarse, spider.solution, result.modes, options);
   for (std::size_t fold = 0; fold < folds && !options.stop.stop_requested(); ++fold) {
-    if (progress) progress({"fold " + std::to_string(fold + 1) + " of " + std::to_string(folds), 0.1 + 0.8 * static_cast<double>(fold) / static_cast<double>(folds), 0});
+    if (progress)
+      progress({"fold " + std::to_string(fold + 1) + " of " + std::to_string(folds),
+                0.1 + 0.8 * static_cast<double>(fold) / static_cast<double>(folds), 0});
     outcome += evaluator.run(fold, folds, result);
   }
   for (const int modes : result.modes)

@@ -11,7 +11,8 @@ constexpr int kFormatVersion = 1;
 constexpr const char *kSymmetricName = "symmetric", *kDirectedName = "directed";
 
 nlohmann::json toJson(const Outcome& outcome) {
-  return {{"termination", name(outcome.termination)}, {"iterations", outcome.iterations}, {"residual", outcome.residual}};
+  return {
+      {"termination", name(outcome.termination)}, {"iterations", outcome.iterations}, {"residual", outcome.residual}};
 }
 
 Outcome outcomeFrom(const nlohmann::json& json) {
@@ -39,9 +40,11 @@ void addSparse(TensorWriter& tensors, const std::string& name, const SparseRows&
   SparseRows compressed = matrix;
   compressed.makeCompressed();
   const auto entries = static_cast<std::size_t>(compressed.nonZeros());
-  tensors.add(name + ".row_begin", {compressed.rows() + 1},
-              std::span<const std::int32_t>(compressed.outerIndexPtr(), static_cast<std::size_t>(compressed.rows()) + 1));
-  tensors.add(name + ".columns", {compressed.nonZeros()}, std::span<const std::int32_t>(compressed.innerIndexPtr(), entries));
+  tensors.add(
+      name + ".row_begin", {compressed.rows() + 1},
+      std::span<const std::int32_t>(compressed.outerIndexPtr(), static_cast<std::size_t>(compressed.rows()) + 1));
+  tensors.add(name + ".columns", {compressed.nonZeros()},
+              std::span<const std::int32_t>(compressed.innerIndexPtr(), entries));
   tensors.add(name + ".values", {compressed.nonZeros()}, std::span<const double>(compressed.valuePtr(), entries));
 }
 
@@ -71,7 +74,8 @@ SparseRows sparseFrom(const TensorFile& tensors, const std::string& name, Eigen:
 Vertices stack(const std::vector<Vertices>& shapes) {
   const auto rows = shapes.front().rows();
   Vertices stacked(rows * static_cast<Eigen::Index>(shapes.size()), 3);
-  for (std::size_t j = 0; j < shapes.size(); ++j) stacked.middleRows(static_cast<Eigen::Index>(j) * rows, rows) = shapes[j];
+  for (std::size_t j = 0; j < shapes.size(); ++j)
+    stacked.middleRows(static_cast<Eigen::Index>(j) * rows, rows) = shapes[j];
   return stacked;
 }
 
@@ -84,7 +88,8 @@ ShellPga pgaFrom(const TensorFile& tensors, int path_steps, Eigen::Index coarse_
   pga.path_steps = path_steps;
   const auto modes = pga.eigenvectors.cols();
   const auto stacked = tensors.matrix<double>("variations", 2 * modes * coarse_vertices, 3);
-  for (Eigen::Index j = 0; j < 2 * modes; ++j) pga.variations.push_back(stacked.middleRows(j * coarse_vertices, coarse_vertices));
+  for (Eigen::Index j = 0; j < 2 * modes; ++j)
+    pga.variations.push_back(stacked.middleRows(j * coarse_vertices, coarse_vertices));
   return pga;
 }
 
@@ -94,7 +99,8 @@ ShellPgaParts partsFrom(const StoredModel& stored) {
   ShellPgaParts parts;
   parts.template_shape = tensors.matrix<double>("template", -1, 3);
   const auto vertex_count = parts.template_shape.rows();
-  parts.topology = std::make_shared<Topology>(static_cast<std::int32_t>(vertex_count), Faces(tensors.matrix<std::int32_t>("faces", -1, 3)));
+  parts.topology = std::make_shared<Topology>(static_cast<std::int32_t>(vertex_count),
+                                              Faces(tensors.matrix<std::int32_t>("faces", -1, 3)));
   parts.reference = tensors.matrix<double>("reference", vertex_count, 3);
   const auto kept = tensors.values<std::int32_t>("coarse.kept");
   parts.coarsening.kept.assign(kept.begin(), kept.end());
@@ -123,12 +129,14 @@ std::int64_t publishShellPga(const ModelDirectory& directory, const std::string&
   tensors.addMatrix("faces", parts.topology->faces());
   tensors.addMatrix("template", parts.template_shape);
   tensors.addMatrix("reference", parts.reference);
-  tensors.add("coarse.kept", {static_cast<std::int64_t>(parts.coarsening.kept.size())}, std::span<const std::int32_t>(parts.coarsening.kept));
+  tensors.add("coarse.kept", {static_cast<std::int64_t>(parts.coarsening.kept.size())},
+              std::span<const std::int32_t>(parts.coarsening.kept));
   tensors.addMatrix("coarse.faces", parts.coarsening.coarse->faces());
   addSparse(tensors, "detail", parts.detail);
   tensors.addMatrix("mean", parts.pga.mean);
-  tensors.add("eigenvalues", {parts.pga.eigenvalues.size()},
-              std::span<const double>(parts.pga.eigenvalues.data(), static_cast<std::size_t>(parts.pga.eigenvalues.size())));
+  tensors.add(
+      "eigenvalues", {parts.pga.eigenvalues.size()},
+      std::span<const double>(parts.pga.eigenvalues.data(), static_cast<std::size_t>(parts.pga.eigenvalues.size())));
   tensors.addMatrix("eigenvectors", parts.pga.eigenvectors);
   tensors.addMatrix("variations", stack(parts.pga.variations));
 
@@ -136,20 +144,21 @@ std::int64_t publishShellPga(const ModelDirectory& directory, const std::string&
   manifest.kind = kShellPgaKind;
   manifest.format_version = kFormatVersion;
   manifest.created_by = "shaped " SHAPED_VERSION;
-  manifest.description = {{"vertices", parts.topology->vertexCount()},
-                          {"faces", parts.topology->faces().rows()},
-                          {"topology", parts.topology->id()},
-                          {"coarse_vertices", parts.coarsening.coarse->vertexCount()},
-                          {"modes", model.modes()},
-                          {"path_steps", parts.pga.path_steps},
-                          {"bending", parts.bending},
-                          {"path_energy", parts.symmetry == EnergySymmetry::kSymmetric ? kSymmetricName : kDirectedName},
-                          {"training_shapes", parts.training.shapes},
-                          {"training",
-                           {{"mean", toJson(parts.training.mean)},
-                            {"variations", toJson(parts.training.variations)},
-                            {"seconds", parts.training.seconds}}},
-                          {"provenance", provenance}};
+  manifest.description = {
+      {"vertices", parts.topology->vertexCount()},
+      {"faces", parts.topology->faces().rows()},
+      {"topology", parts.topology->id()},
+      {"coarse_vertices", parts.coarsening.coarse->vertexCount()},
+      {"modes", model.modes()},
+      {"path_steps", parts.pga.path_steps},
+      {"bending", parts.bending},
+      {"path_energy", parts.symmetry == EnergySymmetry::kSymmetric ? kSymmetricName : kDirectedName},
+      {"training_shapes", parts.training.shapes},
+      {"training",
+       {{"mean", toJson(parts.training.mean)},
+        {"variations", toJson(parts.training.variations)},
+        {"seconds", parts.training.seconds}}},
+      {"provenance", provenance}};
   return directory.publish(name, std::move(manifest), tensors);
 }
 

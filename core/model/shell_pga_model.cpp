@@ -31,9 +31,11 @@ std::int32_t largestFaceAt(const Faces& faces, const Vertices& shape, std::int32
 }  // namespace
 
 ShellPgaModel::ShellPgaModel(ShellPgaParts parts)
-    : parts_(std::move(parts)), submanifold_(makeSubmanifold(parts_)),
+    : parts_(std::move(parts)),
+      submanifold_(makeSubmanifold(parts_)),
       prolongation_(parts_.topology, parts_.coarsening, parts_.reference, parts_.detail),
-      mean_(prolongation_.prolongate(parts_.pga.mean)), coarse_reference_(restrictTo(parts_.coarsening, parts_.reference)),
+      mean_(prolongation_.prolongate(parts_.pga.mean)),
+      coarse_reference_(restrictTo(parts_.coarsening, parts_.reference)),
       coarse_template_(restrictTo(parts_.coarsening, parts_.template_shape)) {}
 
 Vertices ShellPgaModel::restrict(const Vertices& shape, const std::string& field) const {

@@ -14,24 +14,24 @@ namespace shaped {
 
 /// How a model was trained.
 struct TrainingRecord {
-  int shapes = 0;        ///< n
-  Outcome mean;          ///< how the Frechet mean ended
-  Outcome variations;    ///< how the principal variations ended
-  double seconds = 0;    ///< set by whoever measured; 0 where nobody did
+  int shapes = 0;      ///< n
+  Outcome mean;        ///< how the Frechet mean ended
+  Outcome variations;  ///< how the principal variations ended
+  double seconds = 0;  ///< set by whoever measured; 0 where nobody did
 
   Outcome combined() const { return Outcome(mean) += variations; }
 };
 
 /// All that a Shell PGA model is made of; what its file holds.
 struct ShellPgaParts {
-  TopologyPtr topology;      ///< of full-resolution shapes
-  Coarsening coarsening;     ///< the mesh that statistics and solvers work on
-  Vertices template_shape;   ///< full resolution; marker offsets are given in its axes
-  Vertices reference;        ///< full resolution; prolongation carries its detail
-  SparseRows detail;         ///< learned correction of the prolongation, V x 2C
-  double bending = 0;        ///< eta [m^2]
+  TopologyPtr topology;                                  ///< of full-resolution shapes
+  Coarsening coarsening;                                 ///< the mesh that statistics and solvers work on
+  Vertices template_shape;                               ///< full resolution; marker offsets are given in its axes
+  Vertices reference;                                    ///< full resolution; prolongation carries its detail
+  SparseRows detail;                                     ///< learned correction of the prolongation, V x 2C
+  double bending = 0;                                    ///< eta [m^2]
   EnergySymmetry symmetry = EnergySymmetry::kSymmetric;  ///< of the squared distance in paths, mean and Gram matrix
-  ShellPga pga;              ///< on the coarse mesh
+  ShellPga pga;                                          ///< on the coarse mesh
   TrainingRecord training;
 };
 

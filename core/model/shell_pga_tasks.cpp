@@ -81,7 +81,8 @@ ShellPgaScore scoreOf(const ShellPgaModel& model, const Eigen::VectorXd& tangent
   return {std::sqrt(squared), -0.5 * (squared + constants), 0};
 }
 
-Solved<ShellPgaProjection> project(const ShellPgaModel& model, const Vertices& shape, const ProjectionOptions& options) {
+Solved<ShellPgaProjection> project(const ShellPgaModel& model, const Vertices& shape,
+                                   const ProjectionOptions& options) {
   const Vertices coarse = model.restrict(shape, "shape");
   auto solved = model.submanifold().project(coarse, submanifoldOptions(options.modes, options.stop));
   ShellPgaProjection result;
@@ -93,8 +94,9 @@ Solved<ShellPgaProjection> project(const ShellPgaModel& model, const Vertices& s
   result.score = scoreOf(model, result.tangent_coordinates);
   result.score.residual_distance = std::sqrt(std::max(result.residual_energy, 0.0));
   Outcome outcome = solved;
-  const Vertices fine = options.fine ? solveAtFullResolution(model, result.coefficients, solved.solution.realised, options.stop, outcome)
-                                     : model.prolongate(projected);
+  const Vertices fine =
+      options.fine ? solveAtFullResolution(model, result.coefficients, solved.solution.realised, options.stop, outcome)
+                   : model.prolongate(projected);
   result.shape = apply(alignRigidly(fine, shape), fine);
   result.smallest_area_ratio = areaRatio(model, result.shape);
   return {std::move(result), outcome};
@@ -123,12 +125,13 @@ Solved<ShellPgaEdit> edit(const ShellPgaModel& model, const std::vector<Handle>&
   result.energies = std::move(coarse.solution.energies);
   result.coefficients = coarse.solution.projection.point;
   result.projection = model.prolongate(coarse.solution.projection.shape);
-  const auto fine = finishAtFullResolution(model, handles, result.projection, model.prolongate(coarse.solution.shape), options.stop);
+  const auto fine =
+      finishAtFullResolution(model, handles, result.projection, model.prolongate(coarse.solution.shape), options.stop);
   outcome += fine;
   result.shape = fine.solution;
   for (const auto& handle : handles)
-    result.largest_handle_distance = std::max(
-        result.largest_handle_distance, (result.shape.row(handle.vertex).transpose() - handle.position).norm());
+    result.largest_handle_distance = std::max(result.largest_handle_distance,
+                                              (result.shape.row(handle.vertex).transpose() - handle.position).norm());
   result.smallest_area_ratio = areaRatio(model, result.shape);
   return {std::move(result), outcome};
 }

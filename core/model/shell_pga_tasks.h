@@ -5,8 +5,8 @@
 
 namespace shaped {
 
-/// How probable a shape is under the model: a Gaussian in the tangent coordinates with the eigenvalues as variances. Modes
-/// with less than 1e-6 of the largest variance, or with a negative one, do not count.
+/// How probable a shape is under the model: a Gaussian in the tangent coordinates with the eigenvalues as variances.
+/// Modes with less than 1e-6 of the largest variance, or with a negative one, do not count.
 struct ShellPgaScore {
   double mahalanobis = 0;        ///< distance of the projection to the mean in units of the model's deviations
   double log_likelihood = 0;     ///< of the projection's J tangent coordinates [m], natural logarithm of the density
@@ -14,12 +14,12 @@ struct ShellPgaScore {
 };
 
 struct ShellPgaProjection {
-  Vertices shape;                       ///< P[s] at full resolution, rigidly aligned to the input
+  Vertices shape;  ///< P[s] at full resolution, rigidly aligned to the input
   SubmanifoldPoint coefficients;
   Eigen::VectorXd tangent_coordinates;  ///< J coordinates along the principal components [m]
   double residual_energy = 0;           ///< W[s, P[s]] on the coarse mesh [m^2]
   ShellPgaScore score;
-  double smallest_area_ratio = 1;       ///< over triangles: area in `shape` over area in the mean
+  double smallest_area_ratio = 1;  ///< over triangles: area in `shape` over area in the mean
 };
 
 struct ProjectionOptions {
@@ -43,8 +43,8 @@ struct SynthesisOptions {
   std::stop_token stop;
 };
 
-/// The full-resolution shape of coefficients. Throws InvalidInput naming "alpha", "alpha[j]" or "scale" when they are no
-/// point of the submanifold.
+/// The full-resolution shape of coefficients. Throws InvalidInput naming "alpha", "alpha[j]" or "scale" when they are
+/// no point of the submanifold.
 Solved<SynthesizedShape> synthesize(const ShellPgaModel& model, const SubmanifoldPoint& coefficients,
                                     const SynthesisOptions& options);
 

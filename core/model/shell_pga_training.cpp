@@ -11,7 +11,8 @@ namespace {
 void requireShapes(const ShellPgaTrainingSet& set) {
   requireOneComponent(*set.topology, "topology");
   if (set.shapes.size() < 2)
-    throw InvalidInput("shapes", "has " + std::to_string(set.shapes.size()) + ", a model needs at least two training shapes");
+    throw InvalidInput("shapes",
+                       "has " + std::to_string(set.shapes.size()) + ", a model needs at least two training shapes");
   for (std::size_t i = 0; i < set.shapes.size(); ++i)
     requireValidShape(*set.topology, set.shapes[i], "shapes[" + std::to_string(i) + "]");
   if (set.template_shape) requireValidShape(*set.topology, *set.template_shape, "template");
@@ -85,8 +86,8 @@ Solved<ShellPgaModelPtr> trainShellPga(const ShellPgaTrainingSet& set, const She
 
   const GeodesicCalculus calculus(std::make_shared<ShellStructure>(parts.coarsening.coarse),
                                   {parts.bending, parts.symmetry});
-  const auto spider = frechetMean(calculus, coarse, {options.path_steps, options.iterations, options.tolerance, stop,
-                                                     within(progress, 0.1, 0.75)});
+  const auto spider = frechetMean(
+      calculus, coarse, {options.path_steps, options.iterations, options.tolerance, stop, within(progress, 0.1, 0.75)});
   parts.training = {static_cast<int>(set.shapes.size()), spider, {}, 0};
   if (stop.stop_requested()) return {nullptr, cancelled};
   report(progress, "principal variations", 0.75);

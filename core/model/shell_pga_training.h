@@ -9,12 +9,12 @@ struct ShellPgaTrainingOptions {
   int modes = 20;                 ///< J, number of principal variations, 1 .. n - 1
   int path_steps = 4;             ///< K of each discrete geodesic, >= 1
   std::optional<double> bending;  ///< eta [m^2], > 0; default 2.5e-5 times the first shape's squared diameter
-  /// Of the squared distance in paths, mean and Gram matrix. Symmetric: they converge with second order in 1/K; directed:
-  /// as [HZRS18] has it, with first order.
+  /// Of the squared distance in paths, mean and Gram matrix. Symmetric: they converge with second order in 1/K;
+  /// directed: as [HZRS18] has it, with first order.
   EnergySymmetry symmetry = EnergySymmetry::kSymmetric;
-  int coarse_vertices = 1000;     ///< solve on a mesh of at most this many vertices, >= 50
-  double tolerance = 1e-8;        ///< of the Frechet mean: largest relative force imbalance, > 0
-  int iterations = 100;           ///< limit for the Frechet mean's Newton steps, >= 1
+  int coarse_vertices = 1000;  ///< solve on a mesh of at most this many vertices, >= 50
+  double tolerance = 1e-8;     ///< of the Frechet mean: largest relative force imbalance, > 0
+  int iterations = 100;        ///< limit for the Frechet mean's Newton steps, >= 1
 
   /// "path_steps = 0, want >= 1"; empty when all is well.
   std::optional<std::string> firstViolation(int training_shapes) const;

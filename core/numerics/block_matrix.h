@@ -7,7 +7,8 @@
 
 namespace shaped {
 
-/// Symmetric matrix of 3 x 3 blocks; only blocks on and below the diagonal are stored, each column-major and contiguous.
+/// Symmetric matrix of 3 x 3 blocks; only blocks on and below the diagonal are stored, each column-major and
+/// contiguous.
 class SymmetricBlockMatrix {
  public:
   explicit SymmetricBlockMatrix(BlockPatternPtr pattern);
@@ -15,7 +16,9 @@ class SymmetricBlockMatrix {
   const BlockPattern& pattern() const { return *pattern_; }
   void setZero() { std::fill(values_.begin(), values_.end(), 0.0); }
   double* block(std::int32_t lower_slot) { return values_.data() + 9 * static_cast<std::size_t>(lower_slot); }
-  const double* block(std::int32_t lower_slot) const { return values_.data() + 9 * static_cast<std::size_t>(lower_slot); }
+  const double* block(std::int32_t lower_slot) const {
+    return values_.data() + 9 * static_cast<std::size_t>(lower_slot);
+  }
 
   /// y += A x; x and y have 3 n entries and do not overlap.
   void multiplyAdd(const double* x, double* y) const;

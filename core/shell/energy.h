@@ -39,11 +39,10 @@ void addSecondCurvature(const Topology& topology, const ShellMeasures& undeforme
 /// matrix += weight W,12: rows are the undeformed shape's unknowns, columns the deformed one's.
 void addMixedHessian(const ShellStructure& structure, const Vertices& undeformed,
                      const ShellMeasures& undeformed_measures, const Vertices& deformed,
-                     const ShellMeasures& deformed_measures, double bending, double weight,
-                     GeneralBlockMatrix& matrix);
+                     const ShellMeasures& deformed_measures, double bending, double weight, GeneralBlockMatrix& matrix);
 
-/// eta when the user names none [m^2]: 2.5e-5 times the squared diameter, about 1e-4 m^2 for a person. It scales with the
-/// square of the size, and a rigid motion of the shape leaves it as it is.
+/// eta when the user names none [m^2]: 2.5e-5 times the squared diameter, about 1e-4 m^2 for a person. It scales with
+/// the square of the size, and a rigid motion of the shape leaves it as it is.
 double defaultBending(const Vertices& shape);
 
 }  // namespace shaped

@@ -17,7 +17,8 @@ enum class EnergySymmetry {
 class PairEnergy {
  public:
   /// bending: eta [m^2], > 0. A number alone is the directed energy with that bending weight.
-  PairEnergy(double bending, EnergySymmetry symmetry = EnergySymmetry::kDirected) : bending_(bending), symmetry_(symmetry) {}
+  PairEnergy(double bending, EnergySymmetry symmetry = EnergySymmetry::kDirected)
+      : bending_(bending), symmetry_(symmetry) {}
 
   double bending() const { return bending_; }
   EnergySymmetry symmetry() const { return symmetry_; }

@@ -39,7 +39,8 @@ Submanifold::Submanifold(std::shared_ptr<const GeodesicCalculus> calculus, std::
     measures_.push_back(measure(calculus_->topology(), variation));
     forces_[index] = secondForce(*calculus_, measures_.back(), pga_->mean, mean, pins).norm() + floor;
     if (index < pga_->modes())
-      distances_[index] = std::sqrt(std::max(calculus_->energy().value(calculus_->topology(), mean, measures_.back()), 0.0));
+      distances_[index] =
+          std::sqrt(std::max(calculus_->energy().value(calculus_->topology(), mean, measures_.back()), 0.0));
   }
 }
 
@@ -226,8 +227,8 @@ Solved<Path> Submanifold::rescale(const Vertices& local, double scale, const Sub
 
 Solved<Path> Submanifold::march(const Vertices& local, double scale, int steps,
                                 const SubmanifoldOptions& options) const {
-  // No step starts from the nodes of a similar shape: a dent in one of them, where the surface has snapped through, would
-  // be handed on from shape to shape.
+  // No step starts from the nodes of a similar shape: a dent in one of them, where the surface has snapped through,
+  // would be handed on from shape to shape.
   //
   // The exact inverse of the scaling: local lies at rho times the steps on the first segment of a geodesic from the
   // mean, whose first node follows from (24) and the others by (23). So a shape whose local one is on the submanifold

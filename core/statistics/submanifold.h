@@ -24,15 +24,15 @@ struct SubmanifoldProjection {
   Vertices shape;             ///< P[s] (20), in no particular position
   SubmanifoldShape realised;  ///< P_loc[s_loc] (18) and the way from the mean to P[s]
   Path geodesic;              ///< from the mean to s
-  double local_energy;  ///< W[s_loc, P_loc[s_loc]] [m^2]
+  double local_energy;        ///< W[s_loc, P_loc[s_loc]] [m^2]
 };
 
 struct SubmanifoldOptions {
-  int modes = 0;                  ///< J to use, 1 .. model's; 0 = all
-  double kappa = 0.5;             ///< of (17), in (0, 1)
-  int max_iterations = 50;        ///< of the weights' optimisation, >= 1
-  /// Of the weights: sqrt(gain that a step promises / W[mean, s_loc]), > 0. Where the submanifold contains the shape, the
-  /// inner solves leave gains of 1e-6 that no step can collect.
+  int modes = 0;            ///< J to use, 1 .. model's; 0 = all
+  double kappa = 0.5;       ///< of (17), in (0, 1)
+  int max_iterations = 50;  ///< of the weights' optimisation, >= 1
+  /// Of the weights: sqrt(gain that a step promises / W[mean, s_loc]), > 0. Where the submanifold contains the shape,
+  /// the inner solves leave gains of 1e-6 that no step can collect.
   double tolerance = 1e-5;
   double shape_tolerance = 1e-8;  ///< of every inner shape solve, > 0
   std::stop_token stop;
@@ -54,8 +54,8 @@ class Submanifold {
   Solved<SubmanifoldProjection> project(const Vertices& shape, const SubmanifoldOptions& options,
                                         const SubmanifoldProjection* warm = nullptr) const;
 
-  /// The shape of a point, (16): its nodes from the mean on, and the shape itself last. warm: of a similar point, or null.
-  /// Throws InvalidInput naming "alpha" or "scale" when the point is not one of M_J.
+  /// The shape of a point, (16): its nodes from the mean on, and the shape itself last. warm: of a similar point, or
+  /// null. Throws InvalidInput naming "alpha" or "scale" when the point is not one of M_J.
   Solved<SubmanifoldShape> shapeOf(const SubmanifoldPoint& point, const SubmanifoldOptions& options,
                                    const SubmanifoldShape* warm = nullptr) const;
 

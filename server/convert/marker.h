@@ -16,8 +16,8 @@ namespace shaped::server {
 MarkerSet markerSetFromProto(const v1::MarkerSet& message,
                              const google::protobuf::RepeatedPtrField<std::string>& labels);
 
-/// L x 3; a marker with a NaN becomes a row of NaN. Throws InvalidInput naming `field`.positions for another count or an
-/// infinite number.
+/// L x 3; a marker with a NaN becomes a row of NaN. Throws InvalidInput naming `field`.positions for another count or
+/// an infinite number.
 Vertices markersFromProto(const v1::MarkerFrame& frame, Eigen::Index count, const std::string& field = "frame");
 
 }  // namespace shaped::server

@@ -7,9 +7,7 @@
 namespace shaped::server {
 namespace {
 
-v1::PathEnergy pathEnergyOf(bool symmetric) {
-  return symmetric ? v1::PATH_ENERGY_SYMMETRIC : v1::PATH_ENERGY_DIRECTED;
-}
+v1::PathEnergy pathEnergyOf(bool symmetric) { return symmetric ? v1::PATH_ENERGY_SYMMETRIC : v1::PATH_ENERGY_DIRECTED; }
 
 void setIdentity(const std::string& name, std::uint64_t version, const ModelManifest& manifest,
                  v1::ModelDescription& description) {

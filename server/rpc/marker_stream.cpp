@@ -53,8 +53,8 @@ class MarkerStream final : public StreamHandler<v1::FitMarkersRequest, v1::FitMa
   void takeCalibration(const v1::FitMarkersRequest::Setup& setup) {
     constexpr int most = 16;
     if (setup.calibration_size() > most)
-      throw InvalidInput("setup.calibration", "has " + std::to_string(setup.calibration_size()) + " frames, want at most " +
-                                                  std::to_string(most));
+      throw InvalidInput("setup.calibration", "has " + std::to_string(setup.calibration_size()) +
+                                                  " frames, want at most " + std::to_string(most));
     for (int i = 0; i < setup.calibration_size(); ++i)
       calibration_.push_back(
           markersFromProto(setup.calibration(i), marker_count_, "setup.calibration[" + std::to_string(i) + "]"));

@@ -16,7 +16,8 @@ Vertices differenceGradient(const std::function<double(const Vertices&)>& f, con
   return gradient;
 }
 
-Eigen::MatrixXd differenceJacobian(const std::function<Eigen::VectorXd(const Vertices&)>& f, const Vertices& at, double step) {
+Eigen::MatrixXd differenceJacobian(const std::function<Eigen::VectorXd(const Vertices&)>& f, const Vertices& at,
+                                   double step) {
   Eigen::MatrixXd result(f(at).size(), at.size());
   for (Eigen::Index i = 0; i < at.size(); ++i) {
     Vertices plus = at, minus = at;

@@ -12,7 +12,8 @@ std::shared_ptr<const Submanifold> tubeSubmanifold(int modes) {
     const auto set = variedTubes();
     auto pga = principalVariations(*set.calculus, set.spider(2), modes, {});
     REQUIRE(pga.converged());
-    submanifold = std::make_shared<const Submanifold>(set.calculus, std::make_shared<const ShellPga>(std::move(pga.solution)));
+    submanifold =
+        std::make_shared<const Submanifold>(set.calculus, std::make_shared<const ShellPga>(std::move(pga.solution)));
   }
   return submanifold;
 }
@@ -27,7 +28,8 @@ Anchor anchorAt(const Topology& topology, std::int32_t vertex) {
   const auto& faces = topology.faces();
   for (Eigen::Index f = 0; f < faces.rows(); ++f)
     for (int c = 0; c < 3; ++c)
-      if (faces(f, c) == vertex) return {static_cast<std::int32_t>(f), Eigen::Vector3d::Unit(c), Eigen::Vector3d::Zero()};
+      if (faces(f, c) == vertex)
+        return {static_cast<std::int32_t>(f), Eigen::Vector3d::Unit(c), Eigen::Vector3d::Zero()};
   FAIL("vertex " << vertex << " has no face");
   return {};
 }

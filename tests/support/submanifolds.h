@@ -16,6 +16,7 @@ Vertices shapeAt(const Submanifold& submanifold, const Eigen::VectorXd& coordina
 Anchor anchorAt(const Topology& topology, std::int32_t vertex);
 
 /// Targets at the positions that vertices have on a shape.
-std::vector<AnchorTarget> targetsOn(const Topology& topology, const Vertices& shape, const std::vector<std::int32_t>& vertices);
+std::vector<AnchorTarget> targetsOn(const Topology& topology, const Vertices& shape,
+                                    const std::vector<std::int32_t>& vertices);
 
 }  // namespace shaped::test

@@ -107,7 +107,8 @@ struct Fit {
     arguments.option("--modes", modes, "J", "Principal variations to use (all)");
     arguments.option("--prior-weight", prior_weight, "G", "Weight of the model against the markers (1)");
     arguments.option("--scale", scale, "S", "Size of the subject over that of the model (estimated)");
-    arguments.option("--calibration", calibration, "N", "Frames, spread over the trial, that tell the size, 1 to 16 (3)");
+    arguments.option("--calibration", calibration, "N",
+                     "Frames, spread over the trial, that tell the size, 1 to 16 (3)");
   }
 
   ExitCode run(const Session& session) const {
@@ -166,7 +167,9 @@ struct Fit {
     for (std::size_t k = 0; k < stretches; ++k) {
       const auto begin = numbers.begin() + static_cast<std::ptrdiff_t>(k * numbers.size() / stretches);
       const auto end = numbers.begin() + static_cast<std::ptrdiff_t>((k + 1) * numbers.size() / stretches);
-      const auto seen = [&](std::int64_t number) { return frames.positions(number).rowwise().sum().array().isFinite().count(); };
+      const auto seen = [&](std::int64_t number) {
+        return frames.positions(number).rowwise().sum().array().isFinite().count();
+      };
       const auto best = std::max_element(begin, end, [&](auto a, auto b) { return seen(a) < seen(b); });
       if (seen(*best) > 3) *setup.add_calibration() = client::packFrame(frames, *best);
     }

@@ -69,9 +69,9 @@ void convergenceInSteps(Report& report, const DataSet& set, EnergySymmetry symme
     grams.push_back(std::move(observation.gram));
     eigenvalues.push_back(observation.eigenvalues);
   }
-  const std::string which = text("%zu shapes of %s on %ld vertices, %s energy", set.shapes.size(), set.name.c_str(),
-                                 static_cast<long>(set.shapes[0].rows()),
-                                 symmetry == EnergySymmetry::kSymmetric ? "symmetric" : "directed");
+  const std::string which =
+      text("%zu shapes of %s on %ld vertices, %s energy", set.shapes.size(), set.name.c_str(),
+           static_cast<long>(set.shapes[0].rows()), symmetry == EnergySymmetry::kSymmetric ? "symmetric" : "directed");
   report.entry(which + ": Frechet means",
                text("%s, largest residual %.1e, CPU s of all four %.0f", name(outcome.termination).data(),
                     outcome.residual, watch.cpu()),

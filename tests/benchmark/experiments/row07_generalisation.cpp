@@ -34,7 +34,8 @@ void compare(Report& report, const ShellPgaModel& model, const DataSet& set, std
   }
 }
 
-/// Without shapes that repeat an earlier one up to a rigid motion, which training refuses (two of the horse's poses do).
+/// Without shapes that repeat an earlier one up to a rigid motion, which training refuses (two of the horse's poses
+/// do).
 DataSet distinct(const DataSet& set) {
   std::vector<std::size_t> kept;
   const double size = diameter(set.shapes.front());

@@ -27,8 +27,7 @@ void take(Record& record, const MarkerFit& fit, const ShellPgaModel& model, doub
   record.scale = fit.scale;
   if (fit.point.alpha.size() > 0) {
     const Eigen::VectorXd y = model.submanifold().tangentCoordinates(fit.point);
-    record.reach.push_back(
-        y.cwiseAbs().cwiseQuotient(model.pga().eigenvalues.head(y.size()).cwiseSqrt()).maxCoeff());
+    record.reach.push_back(y.cwiseAbs().cwiseQuotient(model.pga().eigenvalues.head(y.size()).cwiseSqrt()).maxCoeff());
   }
   record.marker_squares.resize(static_cast<std::size_t>(fit.residuals.size()));
   record.marker_counts.resize(record.marker_squares.size());
@@ -74,8 +73,8 @@ void tell(Report& report, const Record& record, const MarkerSet& set, std::size_
                text("%.2f, %.2f, %.2f; %.2f", mean(record.seconds), median(record.seconds),
                     *std::max_element(record.seconds.begin() + 1, record.seconds.end()), record.seconds.front()),
                "<= 0.5", mean(record.seconds) <= 0.5);
-  report.entry("smallest area ratio: least, median", text("%.3f, %.3f",
-               *std::min_element(record.area.begin(), record.area.end()), median(record.area)));
+  report.entry("smallest area ratio: least, median",
+               text("%.3f, %.3f", *std::min_element(record.area.begin(), record.area.end()), median(record.area)));
   report.entry("largest coordinate in deviations of its mode: largest, median; scale of the subject",
                text("%.1f, %.1f; %.3f", *std::max_element(record.reach.begin(), record.reach.end()),
                     median(record.reach), record.scale));
@@ -114,8 +113,9 @@ void row8RealTrial() {
     if (!fitted.converged()) record.failed.push_back(frame);
     take(record, fitted.solution.fit, *model, fitted.solution.smallest_area_ratio);
     if (std::getenv("SHAPED_ROW8_TRACE"))
-      std::fprintf(stderr, "%zu %s %.4f %.3f %.3f %.2f %.4g\n", frame, name(fitted.termination).data(), record.rms.back(),
-                   record.area.back(), record.seconds.back(), record.reach.back(), fitted.solution.fit.prior_energy);
+      std::fprintf(stderr, "%zu %s %.4f %.3f %.3f %.2f %.4g\n", frame, name(fitted.termination).data(),
+                   record.rms.back(), record.area.back(), record.seconds.back(), record.reach.back(),
+                   fitted.solution.fit.prior_energy);
     if (out) out->append(fitted.solution.shape);
   }
   if (out) out->close();

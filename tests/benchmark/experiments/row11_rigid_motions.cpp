@@ -36,8 +36,9 @@ void compareEigenvalues(Report& report, const DataSet& set) {
                     name(original.termination).data(), name(turned.termination).data(), before[modes - 1] / before[0],
                     same_mesh ? "the same" : "others"),
                "<= 1e-6", each <= 1e-6);
-  report.entry(set.name + ": change of the default bending weight",
-               text("%.1e relative", std::abs(turned.solution->parts().bending / original.solution->parts().bending - 1)));
+  report.entry(
+      set.name + ": change of the default bending weight",
+      text("%.1e relative", std::abs(turned.solution->parts().bending / original.solution->parts().bending - 1)));
 }
 
 }  // namespace

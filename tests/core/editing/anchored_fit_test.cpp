@@ -39,7 +39,8 @@ TEST_CASE("an anchored fit balances the pulls of its targets and the shell's res
     }
     return sum;
   };
-  const auto fit = fitAnchored(*problem.set.calculus, problem.prior, problem.targets, problem.start, {gamma, 60, 1e-10, {}});
+  const auto fit =
+      fitAnchored(*problem.set.calculus, problem.prior, problem.targets, problem.start, {gamma, 60, 1e-10, {}});
   REQUIRE(fit.converged());
   CHECK(energy(fit.solution) < 0.5 * energy(problem.start));
   const double at_start = differenceGradient(energy, problem.start, 1e-4).norm();
@@ -64,9 +65,11 @@ TEST_CASE("heavier targets are met more closely, and a weight of zero does not p
   Problem problem;
   const auto missOf = [&](double weight) {
     for (auto& target : problem.targets) target.weight = weight;
-    const auto fit = fitAnchored(*problem.set.calculus, problem.prior, problem.targets, problem.start, {1, 60, 1e-8, {}});
+    const auto fit =
+        fitAnchored(*problem.set.calculus, problem.prior, problem.targets, problem.start, {1, 60, 1e-8, {}});
     return (anchorPositions(*problem.set.mesh.topology, problem.targets, fit.solution) -
-            problem.set.shapes[2](kPulled, Eigen::all)).norm();
+            problem.set.shapes[2](kPulled, Eigen::all))
+        .norm();
   };
   const double light = missOf(0.1), heavy = missOf(10);
   CHECK(heavy < 0.2 * light);
@@ -81,9 +84,7 @@ TEST_CASE("heavier targets are met more closely, and a weight of zero does not p
 }
 
 TEST_CASE("three targets off a line determine a placement, fewer or collinear ones do not") {
-  const auto at = [](double x, double y, double weight) {
-    return AnchorTarget{{}, Eigen::Vector3d(x, y, 0), weight};
-  };
+  const auto at = [](double x, double y, double weight) { return AnchorTarget{{}, Eigen::Vector3d(x, y, 0), weight}; };
   CHECK(determinePlacement({at(0, 0, 1), at(1, 0, 1), at(0, 1, 1)}));
   CHECK(!determinePlacement({at(0, 0, 1), at(1, 0, 1)}));
   CHECK(!determinePlacement({at(0, 0, 1), at(1, 1, 1), at(2, 2, 1), at(5, 5, 1)}));

@@ -42,7 +42,8 @@ TEST_CASE("handles on a shape of the submanifold bring that shape back") {
   CHECK(edit.solution.largest_handle_distance < 1e-6);
   const double distance = scene.fromMean(scene.wanted);
   CHECK(edit.solution.energies.back() < 1e-4 * distance);
-  CHECK(shellEnergy(scene.topology, edit.solution.shape, scene.wanted, scene.submanifold->calculus().bending()) < 1e-3 * distance);
+  CHECK(shellEnergy(scene.topology, edit.solution.shape, scene.wanted, scene.submanifold->calculus().bending()) <
+        1e-3 * distance);
   CHECK((edit.solution.shape - scene.wanted).rowwise().norm().maxCoeff() < 0.05);  // in place too
 }
 
@@ -53,10 +54,13 @@ TEST_CASE("handles that no shape of the submanifold meets are met all the same, 
   REQUIRE(edit.converged());
   requireFalling(edit.solution.energies);
   CHECK(edit.solution.largest_handle_distance < 1e-6);
-  CHECK((anchorPositions(scene.topology, scene.handles, edit.solution.shape).row(2).transpose() - scene.handles[2].position).norm() < 1e-6);
+  CHECK((anchorPositions(scene.topology, scene.handles, edit.solution.shape).row(2).transpose() -
+         scene.handles[2].position)
+            .norm() < 1e-6);
   CHECK(edit.solution.energies.back() ==
         Approx(shellEnergy(scene.topology, edit.solution.shape, edit.solution.projection.shape,
-                           scene.submanifold->calculus().bending())).epsilon(1e-6));
+                           scene.submanifold->calculus().bending()))
+            .epsilon(1e-6));
   CHECK(edit.solution.energies.back() > 1e-3 * scene.fromMean(edit.solution.shape));  // the control: it cannot vanish
 }
 
@@ -94,6 +98,7 @@ TEST_CASE("handles that determine no placement are refused") {
   auto two = scene.handles;
   two.resize(2);
   CHECK_THROWS_WITH(editByHandles(*scene.submanifold, two, {}), Catch::Contains("handles"));
-  for (std::size_t l = 0; l < scene.handles.size(); ++l) scene.handles[l].position = Eigen::Vector3d::Constant(0.1 * static_cast<double>(l));
+  for (std::size_t l = 0; l < scene.handles.size(); ++l)
+    scene.handles[l].position = Eigen::Vector3d::Constant(0.1 * static_cast<double>(l));
   CHECK_THROWS_AS(editByHandles(*scene.submanifold, scene.handles, {}), InvalidInput);
 }

@@ -40,7 +40,8 @@ TEST_CASE("with the symmetric energy extrapolating backwards is extrapolating th
   const auto set = variedTubes();
   const auto calculus = with(*set.calculus, EnergySymmetry::kSymmetric);
   const auto path = calculus.interpolate(set.shapes[1], set.shapes[2], 4, {}).solution;
-  const auto before = calculus.extrapolateBackwards(path[0], path[1], {}), after = calculus.extrapolate(path[1], path[0], {});
+  const auto before = calculus.extrapolateBackwards(path[0], path[1], {}),
+             after = calculus.extrapolate(path[1], path[0], {});
   REQUIRE(before.converged());
   REQUIRE(after.converged());
   CHECK(rigidGap(before.solution, after.solution) < 1e-6);
@@ -48,7 +49,8 @@ TEST_CASE("with the symmetric energy extrapolating backwards is extrapolating th
   // the balance (23) at path[0], where nodes are known: one more step forwards comes back to path[1]
   const auto next = calculus.extrapolate(before.solution, path[0], {});
   CHECK(rigidGap(next.solution, path[1]) < 1e-6);
-  const auto inside = calculus.between(path[0], path[1], 0.3, {}), mirrored = calculus.between(path[1], path[0], 0.7, {});
+  const auto inside = calculus.between(path[0], path[1], 0.3, {}),
+             mirrored = calculus.between(path[1], path[0], 0.7, {});
   CHECK(rigidGap(inside.solution, mirrored.solution) < 1e-6);
   const auto end = calculus.through(path[0], inside.solution, 0.3, {});
   CHECK(rigidGap(end.solution, path[1]) < 1e-5);

@@ -81,7 +81,8 @@ TEST_CASE("the size of a subject is found, and one that is given is kept") {
 TEST_CASE("the size comes from the frames that the model explains best") {
   const Trial trial;
   Vertices crumpled = trial.truth(0);
-  for (Eigen::Index v = 0; v < crumpled.rows(); ++v) crumpled.row(v) *= 1 + 0.2 * std::sin(7.0 * static_cast<double>(v));
+  for (Eigen::Index v = 0; v < crumpled.rows(); ++v)
+    crumpled.row(v) *= 1 + 0.2 * std::sin(7.0 * static_cast<double>(v));
   auto tracker = trial.tracker();
   const auto calibrated = tracker.calibrate(
       {trial.markers(1.3 * trial.truth(0)), trial.markers(crumpled), trial.markers(1.3 * trial.truth(3))});
@@ -141,7 +142,8 @@ TEST_CASE("offsets from the skin turn with the surface") {
   const Vertices& mean = trial.submanifold->pga().mean;
   std::vector<std::int32_t> everything(static_cast<std::size_t>(mean.rows()));
   for (std::size_t v = 0; v < everything.size(); ++v) everything[v] = static_cast<std::int32_t>(v);
-  for (std::size_t l = 0; l < trial.sites.size(); ++l) {  // one rigid patch: the offsets follow the whole body's rotation
+  for (std::size_t l = 0; l < trial.sites.size();
+       ++l) {  // one rigid patch: the offsets follow the whole body's rotation
     trial.sites[l].offset = Eigen::Vector3d(0.1, 0.05 * static_cast<double>(l % 3), -0.08);
     trial.sites[l].patch = everything;
     trial.sites[l].patch_template = mean;

@@ -25,9 +25,7 @@ MarkerSet markersAt(const std::vector<std::int32_t>& vertices) {
   return set;
 }
 
-Vertices modelShape(double angle) {
-  return moveRigidly(project(*tubeModel(), bentTube(angle), {}).solution.shape, 3);
-}
+Vertices modelShape(double angle) { return moveRigidly(project(*tubeModel(), bentTube(angle), {}).solution.shape, 3); }
 
 }  // namespace
 

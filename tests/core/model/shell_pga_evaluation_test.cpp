@@ -38,7 +38,8 @@ TEST_CASE("an evaluation measures compactness in closed form, and errors that fa
   CHECK(evaluation.generalisation[1].elastic < evaluation.generalisation[0].elastic);
   CHECK(evaluation.linear[1].vertex < evaluation.linear[0].vertex);
   for (const double specificity : evaluation.specificity) CHECK(specificity > 0);
-  CHECK(evaluate(model, tubes(), brief(), {}).solution.specificity == evaluation.specificity);  // the same random shapes
+  CHECK(evaluate(model, tubes(), brief(), {}).solution.specificity ==
+        evaluation.specificity);  // the same random shapes
 }
 
 TEST_CASE("fewer folds leave more shapes out of each training") {

@@ -46,7 +46,9 @@ TEST_CASE("the fine level balances the average at full resolution, which prolong
     const auto& fine_model = *model.fineSubmanifold();
     double sum = 0;
     for (Eigen::Index j = 0; j < coefficients.alpha.size(); ++j)
-      sum += coefficients.alpha[j] * shellEnergy(model.topology(), fine_model.pga().variations[static_cast<std::size_t>(j)], q, model.parts().bending);
+      sum += coefficients.alpha[j] * shellEnergy(model.topology(),
+                                                 fine_model.pga().variations[static_cast<std::size_t>(j)], q,
+                                                 model.parts().bending);
     return sum;
   };
   CHECK(energy(fine) < energy(coarse));
@@ -74,7 +76,8 @@ TEST_CASE("handles are met exactly at full resolution") {
   const auto& model = *tubeModel();
   const Vertices wanted = moveRigidly(bentTube(0.6), 5);
   std::vector<Handle> handles;
-  for (const std::int32_t vertex : {0, 5, 70, 90, 150, 157}) handles.push_back({vertex, wanted.row(vertex).transpose()});
+  for (const std::int32_t vertex : {0, 5, 70, 90, 150, 157})
+    handles.push_back({vertex, wanted.row(vertex).transpose()});
   const auto edited = edit(model, handles, {});
   REQUIRE(edited.converged());
   CHECK(edited.solution.largest_handle_distance < 1e-9);
@@ -94,7 +97,8 @@ TEST_CASE("tasks refuse what does not fit, by name") {
   CHECK_THROWS_WITH(synthesize(model, {Eigen::VectorXd::Constant(4, 0.25), 0}, {}), Catch::Contains("scale"));
   const Eigen::Vector3d at(0, 0, 0);
   CHECK_THROWS_WITH(edit(model, {{0, at}, {900, at}, {2, at}}, {}), Catch::Contains("handles[1]"));
-  CHECK_THROWS_WITH(edit(model, {{0, at}, {1, at}, {0, at}}, {}), Catch::Contains("handles[2]") && Catch::Contains("second time"));
+  CHECK_THROWS_WITH(edit(model, {{0, at}, {1, at}, {0, at}}, {}),
+                    Catch::Contains("handles[2]") && Catch::Contains("second time"));
   CHECK_THROWS_WITH(edit(model, {{0, at}, {1, {1, 0, 0}}, {2, {2, 0, 0}}}, {}), Catch::Contains("handles"));
   CHECK_THROWS_WITH(edit(model, {{0, at}, {1, {0, std::nan(""), 0}}, {2, at}}, {}), Catch::Contains("handles[1]"));
 }
@@ -104,6 +108,8 @@ TEST_CASE("tasks stop when told to") {
   stop.request_stop();
   const auto& model = *tubeModel();
   const std::vector<Handle> handles{{0, {0, 0, 0}}, {80, {1, 0, 0}}, {157, {2, 1, 0}}};
-  CHECK(project(model, bentTube(0.4), {.modes = 0, .fine = true, .stop = stop.get_token()}).termination == Termination::kCancelled);
-  CHECK(edit(model, handles, {.modes = 0, .outer_iterations = 5, .stop = stop.get_token()}).termination == Termination::kCancelled);
+  CHECK(project(model, bentTube(0.4), {.modes = 0, .fine = true, .stop = stop.get_token()}).termination ==
+        Termination::kCancelled);
+  CHECK(edit(model, handles, {.modes = 0, .outer_iterations = 5, .stop = stop.get_token()}).termination ==
+        Termination::kCancelled);
 }

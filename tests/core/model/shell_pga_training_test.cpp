@@ -39,11 +39,14 @@ void checkRefused(const ShellPgaTrainingSet& set, const ShellPgaTrainingOptions&
 TEST_CASE("training says how it ended, and moves on without going back") {
   double last = 0;
   std::vector<std::string> stages;
-  const auto trained = trainShellPga(tubes(), small(), [&](const Progress& progress) {
-    CHECK(progress.fraction >= last);
-    last = progress.fraction;
-    if (stages.empty() || stages.back() != progress.stage) stages.push_back(progress.stage);
-  }, {});
+  const auto trained = trainShellPga(tubes(), small(),
+                                     [&](const Progress& progress) {
+                                       CHECK(progress.fraction >= last);
+                                       last = progress.fraction;
+                                       if (stages.empty() || stages.back() != progress.stage)
+                                         stages.push_back(progress.stage);
+                                     },
+                                     {});
   REQUIRE(trained.converged());
   CHECK(last == 1);
   CHECK(stages.size() > 3);
@@ -70,7 +73,8 @@ TEST_CASE("rigid motions of the training shapes change no eigenvalue, another si
   auto moved = tubes();
   for (std::size_t i = 0; i < moved.shapes.size(); ++i)
     moved.shapes[i] = moveRigidly(moved.shapes[i], static_cast<unsigned>(i) + 3);
-  const auto before = trainShellPga(tubes(), small(), {}, {}).solution, after = trainShellPga(moved, small(), {}, {}).solution;
+  const auto before = trainShellPga(tubes(), small(), {}, {}).solution,
+             after = trainShellPga(moved, small(), {}, {}).solution;
   const Eigen::ArrayXd still = before->pga().eigenvalues.head(3), turned = after->pga().eigenvalues.head(3);
   CHECK(((turned - still) / still).abs().maxCoeff() < 1e-6);
   moved.shapes[0] *= 1.1;  // the control

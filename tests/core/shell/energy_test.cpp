@@ -53,7 +53,8 @@ Eigen::MatrixXd hessianOf(const ShellStructure& structure, const Vertices& s, co
                           HessianKind kind = HessianKind::kExact) {
   const auto& topology = structure.topology();
   MeasureCurvature curvature(topology, kind);
-  (first ? addFirstCurvature : addSecondCurvature)(topology, measure(topology, s), measure(topology, t), kEta, 1, curvature);
+  (first ? addFirstCurvature : addSecondCurvature)(topology, measure(topology, s), measure(topology, t), kEta, 1,
+                                                   curvature);
   SymmetricBlockMatrix hessian(structure.pattern());
   pullBackHessian(structure, first ? s : t, curvature, hessian);
   return Eigen::MatrixXd(hessian.toSparse());
@@ -127,7 +128,8 @@ TEST_CASE("the energy vanishes at rest, ignores rigid motions of either shape, a
     const auto& topology = *mesh.topology;
     const double energy = shellEnergy(topology, s, t, kEta);
     CHECK(shellEnergy(topology, s, s, kEta) == Approx(0).margin(1e-12));
-    CHECK(shellEnergy(topology, moveRigidly(s, 1), moveRigidly(t, 2), kEta) == Approx(energy).epsilon(1e-9).margin(1e-12));
+    CHECK(shellEnergy(topology, moveRigidly(s, 1), moveRigidly(t, 2), kEta) ==
+          Approx(energy).epsilon(1e-9).margin(1e-12));
     CHECK(shellEnergy(topology, 3 * s, 3 * t, 9 * kEta) == Approx(9 * energy).epsilon(1e-9).margin(1e-12));
     CHECK(shellEnergy(topology, s, 1.2 * t, kEta) != Approx(energy).epsilon(1e-3));  // the control: scaling one counts
   }
@@ -142,10 +144,12 @@ TEST_CASE("closed forms: uniform scaling of a sheet, and a developable fold") {
   Vertices folded = sheet.vertices;  // along the line x = 1/2 by 90 degrees: no stretch
   for (Eigen::Index v = 0; v < folded.rows(); ++v)
     if (folded(v, 0) > 0.5) folded(v, 2) = folded(v, 0) - 0.5, folded(v, 0) = 0.5;
-  const auto parts = shellEnergyParts(*sheet.topology, measure(*sheet.topology, sheet.vertices), measure(*sheet.topology, folded));
+  const auto parts =
+      shellEnergyParts(*sheet.topology, measure(*sheet.topology, sheet.vertices), measure(*sheet.topology, folded));
   CHECK(parts.membrane == Approx(0).margin(1e-14));
   const double right = 3.14159265358979323846 / 2;
-  CHECK(parts.bending_over_eta == Approx(4 * right * right * (0.0625 / 0.0625)).epsilon(1e-12));  // 4 edges, l = 1/16, S = 1/16
+  CHECK(parts.bending_over_eta ==
+        Approx(4 * right * right * (0.0625 / 0.0625)).epsilon(1e-12));  // 4 edges, l = 1/16, S = 1/16
 }
 
 TEST_CASE("a collapsed triangle costs infinite energy in either place") {

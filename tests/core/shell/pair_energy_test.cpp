@@ -81,14 +81,15 @@ TEST_CASE("pair energy gradients and Hessians match central differences") {
       else
         energy.addSecondCurvature(*pair.mesh.topology, pair.of(pair.a), pair.of(pair.b), 1, curvature);
       pullBackHessian(structure, first ? pair.a : pair.b, curvature, hessian);
-      const auto expected = differenceJacobian([&](const Vertices& x) {
-        return first ? gradient(x, pair.b, true) : gradient(pair.a, x, false);
-      }, first ? pair.a : pair.b, 1e-6);
+      const auto expected = differenceJacobian(
+          [&](const Vertices& x) { return first ? gradient(x, pair.b, true) : gradient(pair.a, x, false); },
+          first ? pair.a : pair.b, 1e-6);
       CHECK(relativeGap(Eigen::MatrixXd(hessian.toSparse()), expected) < 1e-6);
     }
     GeneralBlockMatrix mixed(structure.pattern());
     energy.addMixedHessian(structure, pair.a, pair.of(pair.a), pair.b, pair.of(pair.b), 1, mixed);
-    const auto expected = differenceJacobian([&](const Vertices& x) { return gradient(pair.a, x, true); }, pair.b, 1e-6);
+    const auto expected =
+        differenceJacobian([&](const Vertices& x) { return gradient(pair.a, x, true); }, pair.b, 1e-6);
     CHECK(relativeGap(Eigen::MatrixXd(mixed.toSparse()), expected) < 1e-6);
   }
 }
@@ -104,8 +105,10 @@ TEST_CASE("the symmetric energy agrees with its metric to fourth order, W to thi
     return std::abs(pair.value(symmetry, from, to) / (t * t) - metric) / metric;
   };
   for (const double t : {0.02, 0.01}) {
-    const double symmetric_order = std::log2(excess(EnergySymmetry::kSymmetric, t) / excess(EnergySymmetry::kSymmetric, t / 2));
-    const double directed_order = std::log2(excess(EnergySymmetry::kDirected, t) / excess(EnergySymmetry::kDirected, t / 2));
+    const double symmetric_order =
+        std::log2(excess(EnergySymmetry::kSymmetric, t) / excess(EnergySymmetry::kSymmetric, t / 2));
+    const double directed_order =
+        std::log2(excess(EnergySymmetry::kDirected, t) / excess(EnergySymmetry::kDirected, t / 2));
     CHECK(symmetric_order == Approx(2).margin(0.2));
     CHECK(directed_order == Approx(1).margin(0.3));
   }
