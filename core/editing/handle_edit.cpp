@@ -52,7 +52,7 @@ class HandleEditor {
   Outcome round(const Vertices& prior, State& state);
   double relativeFall(const State& before, const State& after) const;
   Start plainStart() const { return {state_.projection.point, state_.projection.shape, false}; }
-  void chooseStart(const Start& last, Outcome& outcome);
+  void chooseStart(Outcome& outcome);
   Outcome alternate();
   double handleDistance(const Vertices& shape) const {
     return (anchorPositions(calculus_.topology(), handles_, shape) - wanted_).rowwise().norm().maxCoeff();
@@ -80,7 +80,7 @@ void HandleEditor::place() {
   const auto& pga = submanifold_.pga();
   state_.shape = apply(alignRigidly(anchorPositions(calculus_.topology(), handles_, pga.mean), wanted_), pga.mean);
   state_.projection.point = submanifold_.pointOf(Eigen::VectorXd::Zero(pga.modes()));
-  state_.projection.shape = state_.projection.realised.local = state_.shape;
+  state_.projection.shape = state_.projection.local = state_.shape;
   shifted_ = handles_;
   for (auto& handle : shifted_) handle.weight = 100;
 }
@@ -144,14 +144,14 @@ double HandleEditor::relativeFall(const State& before, const State& after) const
 }
 
 /// Where the next round starts: at the last projection, or ahead of it where the accelerator sees a way.
-void HandleEditor::chooseStart(const Start& last, Outcome& outcome) {
-  accelerator_.add({last.point}, {state_.projection.point});
+void HandleEditor::chooseStart(Outcome& outcome) {
+  accelerator_.add({start_.point}, {state_.projection.point});
   start_ = plainStart();
   const auto proposed = accelerator_.propose();
   if (!proposed) return;
-  auto ahead = submanifold_.shapeOf(proposed->point, options_.submanifold, &state_.projection.realised);
+  auto ahead = submanifold_.shapeOf(proposed->point, options_.submanifold, &state_.projection.local);
   outcome.iterations += ahead.iterations;
-  if (ahead.converged()) start_ = {proposed->point, ahead.solution.shape(), true};
+  if (ahead.converged()) start_ = {proposed->point, std::move(ahead.solution.shape), true};
 }
 
 Outcome HandleEditor::alternate() {
@@ -178,7 +178,7 @@ Outcome HandleEditor::alternate() {
     small_falls = outcome.residual <= options_.tolerance ? small_falls + 1 : 0;
     state_ = std::move(next);
     if (small_falls == 2) return {Termination::kConverged, outcome.iterations, outcome.residual};
-    chooseStart(Start(start_), outcome);
+    chooseStart(outcome);
   }
   return outcome;
 }

@@ -217,9 +217,9 @@ Outcome MarkerTracker::round(bool estimate_scale) {
 bool MarkerTracker::lookAhead(const ProjectionAccelerator& accelerator, ProjectionAccelerator::State& start) {
   const auto proposed = accelerator.propose();
   if (!proposed) return false;
-  auto ahead = submanifold_->shapeOf(proposed->point, options_.submanifold, &state_.projection.realised);
+  auto ahead = submanifold_->shapeOf(proposed->point, options_.submanifold, &state_.projection.local);
   if (!ahead.converged()) return false;
-  state_.prior = ahead.solution.shape();
+  state_.prior = std::move(ahead.solution.shape);
   if (!options_.scale) rescale(std::exp(proposed->extra / size_) / state_.scale);
   start = *proposed;
   return true;

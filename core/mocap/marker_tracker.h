@@ -25,9 +25,9 @@ struct MarkerSite {
 
 struct MarkerTrackerOptions {
   double prior_weight = 1;  ///< gamma of (22), > 0
-  double robust_scale =
-      0.05;              ///< distance at which a marker's pull is quartered, over the model's size; 0 = least squares
-  int alternations = 1;  ///< projections a frame after the first, >= 1
+  /// Distance at which a marker's pull is quartered, over the model's size; 0 = least squares.
+  double robust_scale = 0.05;
+  int alternations = 1;         ///< projections a frame after the first, >= 1
   int first_alternations = 30;  ///< at most, in the first frame, >= 1
   std::optional<double> scale;  ///< size of the subject over that of the model; estimated where not given
   /// Looser than elsewhere: the markers' own error is far above what this costs.

@@ -122,7 +122,7 @@ double specificity(const ShellPgaModel& model, const std::vector<Vertices>& shap
     SubmanifoldOptions submanifold_options;
     submanifold_options.stop = options.stop;
     const auto shape =
-        model.submanifold().shapeOf(model.submanifold().pointOf(y), submanifold_options).solution.shape();
+        model.submanifold().shapeOf(model.submanifold().pointOf(y), submanifold_options).solution.shape;
     const auto measures = measure(calculus.topology(), shape);
     double nearest = std::numeric_limits<double>::infinity();
     for (const auto& known : shapes)

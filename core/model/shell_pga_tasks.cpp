@@ -52,15 +52,14 @@ Solved<Vertices> finishAtFullResolution(const ShellPgaModel& model, const std::v
   return minimiseShell(objective, *structure, start, {60, 1e-6, std::move(stop)});
 }
 
-/// The shape of coefficients in the submanifold of the prolongated mean and variations, started from the prolongated
-/// coarse solution.
+/// The shape of coefficients in the submanifold of the prolongated mean and variations. coarse_local: q(alpha) on the
+/// coarse mesh, from which the solution starts.
 Vertices solveAtFullResolution(const ShellPgaModel& model, const SubmanifoldPoint& coefficients,
-                               const SubmanifoldShape& coarse, const std::stop_token& stop, Outcome& outcome) {
-  SubmanifoldShape start{model.prolongate(coarse.local), {}};
-  for (const auto& node : coarse.nodes) start.nodes.push_back(model.prolongate(node));
+                               const Vertices& coarse_local, const std::stop_token& stop, Outcome& outcome) {
+  const Vertices start = model.prolongate(coarse_local);
   auto solved = model.fineSubmanifold()->shapeOf(coefficients, submanifoldOptions(0, stop), &start);
   outcome += solved;
-  return solved.solution.shape();
+  return std::move(solved.solution.shape);
 }
 
 /// Modes of less than this share of the largest variance, or of a negative one, carry no information about the training
@@ -95,7 +94,7 @@ Solved<ShellPgaProjection> project(const ShellPgaModel& model, const Vertices& s
   result.score.residual_distance = std::sqrt(std::max(result.residual_energy, 0.0));
   Outcome outcome = solved;
   const Vertices fine =
-      options.fine ? solveAtFullResolution(model, result.coefficients, solved.solution.realised, options.stop, outcome)
+      options.fine ? solveAtFullResolution(model, result.coefficients, solved.solution.local, options.stop, outcome)
                    : model.prolongate(projected);
   result.shape = apply(alignRigidly(fine, shape), fine);
   result.smallest_area_ratio = areaRatio(model, result.shape);
@@ -106,8 +105,9 @@ Solved<SynthesizedShape> synthesize(const ShellPgaModel& model, const Submanifol
                                     const SynthesisOptions& options) {
   const auto coarse = model.submanifold().shapeOf(coefficients, submanifoldOptions(0, options.stop));
   Outcome outcome = coarse;
-  Vertices shape = options.fine ? solveAtFullResolution(model, coefficients, coarse.solution, options.stop, outcome)
-                                : model.prolongate(coarse.solution.shape());
+  Vertices shape = options.fine
+                       ? solveAtFullResolution(model, coefficients, coarse.solution.local, options.stop, outcome)
+                       : model.prolongate(coarse.solution.shape);
   const double ratio = areaRatio(model, shape);
   return {{std::move(shape), ratio}, outcome};
 }

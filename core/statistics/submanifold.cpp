@@ -199,20 +199,19 @@ Solved<SubmanifoldProjection> Submanifold::project(const Vertices& shape, const 
     start[static_cast<Eigen::Index>(j)] = warm ? warm->point.alpha[static_cast<Eigen::Index>(vertices[j])] : 1.0;
   if (!(start.sum() > 0)) start.setOnes();  // warm, but with other modes
   start /= start.sum();
-  Vertices local_shape = warm ? warm->realised.local : pga_->mean;
+  result.local = warm ? warm->local : pga_->mean;
   const auto weights = optimiseWeights(measure(calculus_->topology(), local.solution), vertices, start, options,
-                                       local_shape, result.local_energy);
+                                       result.local, result.local_energy);
   outcome += weights;
   result.point.alpha = weights.solution.alpha;
-  auto scaled = rescale(local_shape, result.point.scale, options);
+  auto scaled = rescale(result.local, result.point.scale, options);
   outcome += scaled;
-  result.realised = {std::move(local_shape), std::move(scaled.solution)};
-  result.shape = result.realised.shape();
+  result.shape = std::move(scaled.solution);
   result.geodesic = std::move(path.solution);
   return {std::move(result), outcome};
 }
 
-Solved<Path> Submanifold::rescale(const Vertices& local, double scale, const SubmanifoldOptions& options) const {
+Solved<Vertices> Submanifold::rescale(const Vertices& local, double scale, const SubmanifoldOptions& options) const {
   // Far from the mean (23) may have no solution for steps as long as a K-th of the way; then shorter ones.
   int spent = 0;
   for (int steps = pga_->path_steps;; steps *= 2) {
@@ -225,32 +224,30 @@ Solved<Path> Submanifold::rescale(const Vertices& local, double scale, const Sub
   }
 }
 
-Solved<Path> Submanifold::march(const Vertices& local, double scale, int steps,
-                                const SubmanifoldOptions& options) const {
-  // No step starts from the nodes of a similar shape: a dent in one of them, where the surface has snapped through,
-  // would be handed on from shape to shape.
-  //
+Solved<Vertices> Submanifold::march(const Vertices& local, double scale, int steps,
+                                    const SubmanifoldOptions& options) const {
   // The exact inverse of the scaling: local lies at rho times the steps on the first segment of a geodesic from the
   // mean, whose first node follows from (24) and the others by (23). So a shape whose local one is on the submanifold
   // comes back.
+  //
+  // No step starts from the nodes of a similar shape: a dent in one of them, where the surface has snapped through,
+  // would be handed on from shape to shape.
   const auto geodesic_options = geodesicOptions(options);
-  if (scale * steps > 1) {
-    auto end = calculus_->at({pga_->mean, local}, 1 / scale, geodesic_options);
-    return {Path{pga_->mean, std::move(end.solution)}, end};
-  }
+  if (scale * steps > 1) return calculus_->at({pga_->mean, local}, 1 / scale, geodesic_options);
   auto first = calculus_->through(pga_->mean, local, scale * steps, geodesic_options);
   Outcome outcome = first;
-  Path nodes{pga_->mean, std::move(first.solution)};
-  for (std::size_t k = 1; k < static_cast<std::size_t>(steps) && outcome.converged(); ++k) {
-    auto next = calculus_->extrapolate(nodes[k - 1], nodes[k], geodesic_options);
+  Vertices here = std::move(first.solution), before = pga_->mean;
+  for (int k = 1; k < steps && outcome.converged(); ++k) {
+    auto next = calculus_->extrapolate(before, here, geodesic_options);
     outcome += next;
-    nodes.push_back(std::move(next.solution));
+    before = std::move(here);
+    here = std::move(next.solution);
   }
-  return {std::move(nodes), outcome};
+  return {std::move(here), outcome};
 }
 
 Solved<SubmanifoldShape> Submanifold::shapeOf(const SubmanifoldPoint& point, const SubmanifoldOptions& options,
-                                              const SubmanifoldShape* warm) const {
+                                              const Vertices* near) const {
   if (point.alpha.size() != forces_.size())
     throw InvalidInput(
         "alpha", "has " + std::to_string(point.alpha.size()) + " entries, want " + std::to_string(forces_.size()));
@@ -259,11 +256,11 @@ Solved<SubmanifoldShape> Submanifold::shapeOf(const SubmanifoldPoint& point, con
   if (!(std::abs(point.alpha.sum() - 1) < 1e-6))
     throw InvalidInput("alpha", "sums to " + std::to_string(point.alpha.sum()) + ", want 1");
   if (!(point.scale > 0) || !std::isfinite(point.scale)) throw InvalidInput("scale", "must be a positive number");
-  auto local = average(point.alpha, warm ? warm->local : pga_->mean, options);
+  auto local = average(point.alpha, near ? *near : pga_->mean, options);
   auto scaled = rescale(local.solution, point.scale, options);
   Outcome outcome = local;
   outcome += scaled;
-  return {{std::move(local.solution), std::move(scaled.solution)}, outcome};
+  return {{std::move(scaled.solution), std::move(local.solution)}, outcome};
 }
 
 Eigen::VectorXd Submanifold::tangentCoordinates(const SubmanifoldPoint& point) const {

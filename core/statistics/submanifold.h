@@ -10,21 +10,19 @@ struct SubmanifoldPoint {
   double scale = 1;       ///< rho of (17), > 0; a projection's is at most 1 / K
 };
 
-/// A shape of the submanifold, with what the computation of a similar one can start from.
+/// A shape of the submanifold, with the local one that a similar point's solution can start from.
 struct SubmanifoldShape {
+  Vertices shape;  ///< I(mean, local, 1 / scale), in no particular position
   Vertices local;  ///< q(alpha)
-  Path nodes;      ///< from the mean to the shape: what rescaling (20) passes through
-
-  const Vertices& shape() const { return nodes.back(); }
 };
 
 /// Projection of one shape, with what a similar shape's projection can start from.
 struct SubmanifoldProjection {
   SubmanifoldPoint point;
-  Vertices shape;             ///< P[s] (20), in no particular position
-  SubmanifoldShape realised;  ///< P_loc[s_loc] (18) and the way from the mean to P[s]
-  Path geodesic;              ///< from the mean to s
-  double local_energy;        ///< W[s_loc, P_loc[s_loc]] [m^2]
+  Vertices shape;       ///< P[s] (20), in no particular position
+  Vertices local;       ///< P_loc[s_loc] (18)
+  Path geodesic;        ///< from the mean to s
+  double local_energy;  ///< W[s_loc, P_loc[s_loc]] [m^2]
 };
 
 struct SubmanifoldOptions {
@@ -54,10 +52,10 @@ class Submanifold {
   Solved<SubmanifoldProjection> project(const Vertices& shape, const SubmanifoldOptions& options,
                                         const SubmanifoldProjection* warm = nullptr) const;
 
-  /// The shape of a point, (16): its nodes from the mean on, and the shape itself last. warm: of a similar point, or
-  /// null. Throws InvalidInput naming "alpha" or "scale" when the point is not one of M_J.
+  /// The shape of a point, (16). near: q(alpha) of a similar point, or null. Throws InvalidInput naming "alpha" or
+  /// "scale" when the point is not one of M_J.
   Solved<SubmanifoldShape> shapeOf(const SubmanifoldPoint& point, const SubmanifoldOptions& options,
-                                   const SubmanifoldShape* warm = nullptr) const;
+                                   const Vertices* near = nullptr) const;
 
   /// Coordinates in the principal components [m]: y_j = (alpha_j - alpha_-j) dist(mean, p_j) / scale, the logarithm of
   /// the point to first order. Their variance over the training shapes is the eigenvalue.
@@ -76,9 +74,9 @@ class Submanifold {
   Solved<SubmanifoldPoint> optimiseWeights(const ShellMeasures& target, const std::vector<std::size_t>& vertices,
                                            Eigen::VectorXd start, const SubmanifoldOptions& options, Vertices& q,
                                            double& energy) const;
-  /// I(mean, local, 1 / scale) in K steps, or more where K do not get there: the shapes from the mean to there.
-  Solved<Path> rescale(const Vertices& local, double scale, const SubmanifoldOptions& options) const;
-  Solved<Path> march(const Vertices& local, double scale, int steps, const SubmanifoldOptions& options) const;
+  /// I(mean, local, 1 / scale) in K steps, or more where K do not get there.
+  Solved<Vertices> rescale(const Vertices& local, double scale, const SubmanifoldOptions& options) const;
+  Solved<Vertices> march(const Vertices& local, double scale, int steps, const SubmanifoldOptions& options) const;
 
   std::shared_ptr<const GeodesicCalculus> calculus_;
   std::shared_ptr<const ShellPga> pga_;

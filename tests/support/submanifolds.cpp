@@ -21,7 +21,7 @@ std::shared_ptr<const Submanifold> tubeSubmanifold(int modes) {
 Vertices shapeAt(const Submanifold& submanifold, const Eigen::VectorXd& coordinates) {
   const auto solved = submanifold.shapeOf(submanifold.pointOf(coordinates), {});
   REQUIRE(solved.converged());
-  return solved.solution.shape();
+  return solved.solution.shape;
 }
 
 Anchor anchorAt(const Topology& topology, std::int32_t vertex) {

@@ -41,7 +41,7 @@ struct Model {
   Vertices shapeOf(const SubmanifoldPoint& point) const {
     const auto solved = manifold->shapeOf(point, {});
     REQUIRE(solved.converged());
-    return solved.solution.shape();
+    return solved.solution.shape;
   }
   /// The distance of a shape from another in units of its distance from the mean.
   double relativeGap(const Vertices& found, const Vertices& shape) const {
@@ -78,7 +78,7 @@ TEST_CASE("the local projection (18) is optimal: no change of the weights lowers
     const auto& alpha = projection.point.alpha;
     const Vertices target = model.set.calculus->at(projection.geodesic, projection.point.scale, {}).solution;
     const auto energy = [&](const Eigen::VectorXd& weights) {
-      const auto q = model.manifold->average(weights, projection.realised.local, {}).solution;
+      const auto q = model.manifold->average(weights, projection.local, {}).solution;
       return shellEnergy(*model.set.mesh.topology, target, q, model.set.calculus->bending());
     };
     const double least = energy(alpha),
