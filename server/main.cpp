@@ -1,59 +1,68 @@
-#include <semaphore.h>
-
-#include <cerrno>
-#include <csignal>
 #include <iostream>
 #include <thread>
 
 #include "core/numerics/error.h"
 #include "core/numerics/threads.h"
+#include "server/daemon/command_line.h"
 #include "server/daemon/daemon.h"
+#include "server/daemon/signals.h"
 #include "server/telemetry/call_log.h"
 
 namespace {
 
 using namespace shaped;
+using server::CommandLine;
 
-sem_t stop_asked;
-
-// Handlers, not a signal mask with sigwait: libraries start threads before main, which no mask of ours reaches.
-void stopOnSignals() {
-  sem_init(&stop_asked, 0, 0);
-  struct sigaction action {};
-  action.sa_handler = [](int) { sem_post(&stop_asked); };
-  action.sa_flags = SA_RESTART;
-  sigaction(SIGINT, &action, nullptr);
-  sigaction(SIGTERM, &action, nullptr);
-  // A file over the size limit is an error to report, not to die of.
-  signal(SIGXFSZ, SIG_IGN);
+CommandLine readCommandLine(const std::vector<std::string>& words) {
+  return server::parseCommandLine(words, static_cast<int>(std::max(1U, std::thread::hardware_concurrency())));
 }
 
-int serve(const server::DaemonOptions& options) {
+/// The daemon goes on with what it has when the configuration is faulty.
+void reload(server::Daemon& daemon, const std::vector<std::string>& words) try {
+  daemon.reload(readCommandLine(words).options);
+} catch (const std::exception& error) {
+  server::logError(std::string("the configuration is not taken over: ") + error.what());
+}
+
+int serve(const server::DaemonOptions& options, const std::vector<std::string>& words) {
   server::startLog(options.log);
   server::Daemon daemon(options);
   server::logInfo("listening on " + daemon.address() + ", store " + options.store.string() + ", " +
                   std::to_string(options.threads) + " threads");
-  while (sem_wait(&stop_asked) != 0 && errno == EINTR) {
-  }
+  while (server::waitForSignal() == server::Signal::kReload) reload(daemon, words);
   server::logInfo("stopping");
-  daemon.shutdown(std::chrono::seconds(5));
+  daemon.announceStop();
+  server::stopSignalWithin(std::chrono::duration<double>(daemon.options().drain));
+  daemon.shutdown(std::chrono::duration<double>(daemon.options().grace));
   server::logInfo("stopped");
   return 0;
+}
+
+int run(const std::vector<std::string>& words) {
+  const auto command = readCommandLine(words);
+  switch (command.action) {
+    case CommandLine::Action::kServe:
+      return serve(command.options, words);
+    case CommandLine::Action::kCheck:
+      std::cout << server::describe(command.options) << "# in order\n";
+      return 0;
+    case CommandLine::Action::kHelp:
+      std::cout << server::usage();
+      return 0;
+    case CommandLine::Action::kVersion:
+      std::cout << "shaped " SHAPED_VERSION "\n";
+      return 0;
+  }
+  return 1;
 }
 
 }  // namespace
 
 int main(int argc, char** argv) {
-  stopOnSignals();
+  server::catchSignals();
   limitLibraryThreads();
   try {
-    const auto processors = static_cast<int>(std::max(1U, std::thread::hardware_concurrency()));
-    const auto options = server::parseOptions({argv + 1, argv + argc}, processors);
-    if (!options) {
-      std::cout << server::usage();
-      return 0;
-    }
-    return serve(*options);
+    return run({argv + 1, argv + argc});
   } catch (const InvalidInput& error) {
     std::cerr << "shaped: " << error.what() << "\n";
     return 2;

@@ -8,6 +8,7 @@
 #include "server/jobs/arena.h"
 #include "server/rpc/limits.h"
 #include "server/rpc/training.h"
+#include "server/telemetry/call_log.h"
 
 namespace shaped::server {
 namespace {
@@ -23,7 +24,8 @@ void alone(const std::function<void()>& serve) { runInArena(1, serve); }
 }  // namespace
 
 Daemon::Daemon(const DaemonOptions& options)
-    : lock_(options.store),
+    : options_(options),
+      lock_(options.store),
       models_(options.store / "models"),
       datasets_(options.store / "datasets"),
       pool_(options.threads, options.limits, alone),
@@ -70,9 +72,33 @@ void Daemon::listen(const std::string& address) {
 
 Daemon::~Daemon() { shutdown(std::chrono::seconds(0)); }
 
+void Daemon::reload(const DaemonOptions& options) {
+  const auto before = options_;
+  for (const auto& spec : optionSpecs()) {
+    const auto value = spec.show(options);
+    if (value == spec.show(before)) continue;
+    if (spec.while_running) spec.set(options_, spec.name, value);
+    logInfo(spec.name + " is now " + value +
+            (spec.while_running ? "" : " in the configuration: from the next start on"));
+  }
+  useLimits();
+  logInfo("configuration read again");
+}
+
+void Daemon::useLimits() {
+  setLogLevel(options_.log);
+  pool_.setLimits(options_.limits);
+  light_.setLimits(options_.limits);
+  runtime_.longest_call = std::chrono::duration<double>(options_.longest_call);
+}
+
+void Daemon::announceStop() {
+  if (auto* health = server_ ? server_->GetHealthCheckService() : nullptr) health->SetServingStatus(false);
+}
+
 void Daemon::shutdown(std::chrono::duration<double> grace) {
   if (!server_) return;
-  if (auto* health = server_->GetHealthCheckService()) health->SetServingStatus(false);
+  announceStop();
   jobs_.cancelAll();
   server_->Shutdown(std::chrono::system_clock::now() +
                     std::chrono::duration_cast<std::chrono::system_clock::duration>(grace));

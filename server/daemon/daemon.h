@@ -28,12 +28,20 @@ class Daemon {
 
   /// The address in use, with the real port.
   const std::string& address() const { return address_; }
+  /// The options in force.
+  const DaemonOptions& options() const { return options_; }
+  /// Takes over the options that may change while it runs, and logs what changed and what waits for a restart.
+  void reload(const DaemonOptions& options);
+  /// Health says NOT_SERVING from here on; calls are still answered.
+  void announceStop();
   /// Takes no new calls, cancels jobs, lets running calls go on for `grace`, then cancels them.
   void shutdown(std::chrono::duration<double> grace);
 
  private:
   void listen(const std::string& address);
+  void useLimits();
 
+  DaemonOptions options_;
   const StoreLock lock_;
   ModelStore models_;
   DatasetStore datasets_;

@@ -1,81 +1,128 @@
 #include "server/daemon/options.h"
 
-#include <functional>
-#include <map>
+#include <algorithm>
 
 #include "core/io/text_scanner.h"
 #include "core/numerics/error.h"
+#include "server/telemetry/call_log.h"
 
 namespace shaped::server {
 namespace {
 
-double numberOf(const std::string& option, const std::string& text, double least, double most) {
-  double value = 0;
-  if (!parseNumber(text, value) || !(value >= least && value <= most))
-    throw InvalidInput(option, "\"" + text + "\", want a number from " + shortest(least) + " to " + shortest(most));
-  return value;
+enum class When { kAtStart, kWhileRunning };
+
+template <class Access>
+OptionSpec textOption(std::string name, std::string value_name, When when, Access access, std::string help) {
+  return {std::move(name),
+          std::move(value_name),
+          std::move(help),
+          when == When::kWhileRunning,
+          [access](DaemonOptions& options, const std::string&, const std::string& value) { access(options) = value; },
+          [access](DaemonOptions options) -> std::string { return access(options); }};
 }
 
-std::size_t countOf(const std::string& option, const std::string& text, std::int64_t most) {
-  std::int64_t value = 0;
-  if (!parseInteger(text, value) || value < 1 || value > most)
-    throw InvalidInput(option, "\"" + text + "\", want a whole number from 1 to " + std::to_string(most));
-  return static_cast<std::size_t>(value);
-}
-
-using Setter = std::function<void(DaemonOptions&, const std::string& option, const std::string& value)>;
-
-const std::map<std::string, Setter>& setters() {
-  static const std::map<std::string, Setter> table{
-      {"--listen", [](auto& options, auto&, auto& value) { options.listen = value; }},
-      {"--store", [](auto& options, auto&, auto& value) { options.store = value; }},
-      {"--threads",
-       [](auto& options, auto& name, auto& value) { options.threads = static_cast<int>(countOf(name, value, 1024)); }},
-      {"--longest-call",
-       [](auto& options, auto& name, auto& value) { options.longest_call = numberOf(name, value, 0.001, 1e6); }},
-      {"--publish-patience",
-       [](auto& options, auto& name, auto& value) { options.publish_patience = numberOf(name, value, 0, 1e6); }},
-      {"--queue-length",
-       [](auto& options, auto& name, auto& value) { options.limits.queue_length = countOf(name, value, 1 << 20); }},
-      {"--queue-megabytes", [](auto& options, auto& name,
-                               auto& value) { options.limits.queue_bytes = countOf(name, value, 1 << 20) << 20; }},
-      {"--open-streams",
-       [](auto& options, auto& name, auto& value) { options.limits.open_streams = countOf(name, value, 1 << 20); }},
-      {"--log", [](auto& options, auto&, auto& value) { options.log = value; }},
+/// A number from least to most.
+template <class Access>
+OptionSpec numberOption(std::string name, std::string value_name, When when, double least, double most, Access access,
+                        std::string help) {
+  const auto set = [=](DaemonOptions& options, const std::string& where, const std::string& text) {
+    double value = 0;
+    if (!parseNumber(text, value) || !(value >= least && value <= most))
+      throw InvalidInput(where, "\"" + text + "\", want a number from " + shortest(least) + " to " + shortest(most));
+    access(options) = value;
   };
-  return table;
+  return {std::move(name),
+          std::move(value_name),
+          std::move(help),
+          when == When::kWhileRunning,
+          set,
+          [access](DaemonOptions options) { return shortest(access(options)); }};
+}
+
+/// A whole number from 1 to most, in units of `unit`.
+template <class Access>
+OptionSpec countOption(std::string name, std::string value_name, When when, std::int64_t most, Access access,
+                       std::string help, std::int64_t unit = 1) {
+  const auto set = [=](DaemonOptions& options, const std::string& where, const std::string& text) {
+    std::int64_t value = 0;
+    if (!parseInteger(text, value) || value < 1 || value > most)
+      throw InvalidInput(where, "\"" + text + "\", want a whole number from 1 to " + std::to_string(most));
+    auto& member = access(options);
+    member = static_cast<std::remove_reference_t<decltype(member)>>(value * unit);
+  };
+  return {std::move(name),
+          std::move(value_name),
+          std::move(help),
+          when == When::kWhileRunning,
+          set,
+          [=](DaemonOptions options) { return std::to_string(static_cast<std::int64_t>(access(options)) / unit); }};
+}
+
+OptionSpec logLevelOption() {
+  auto option = textOption(
+      "log", "LEVEL", When::kWhileRunning, [](auto& o) -> auto& { return o.log; },
+      "debug, info, warn or error, to stderr");
+  option.set = [](DaemonOptions& options, const std::string& where, const std::string& value) {
+    requireLogLevel(value, where);
+    options.log = value;
+  };
+  return option;
+}
+
+constexpr std::int64_t kMostCount = 1 << 20;
+constexpr double kMostSeconds = 1e6;
+
+std::vector<OptionSpec> makeSpecs() {
+  return {
+      textOption(
+          "listen", "HOST:PORT", When::kAtStart, [](auto& o) -> auto& { return o.listen; },
+          "address to serve on, port 0 for any free one; unix:PATH works too"),
+      textOption(
+          "store", "DIR", When::kAtStart, [](auto& o) -> auto& { return o.store; },
+          "folder of models, datasets and jobs, made when missing"),
+      countOption(
+          "threads", "N", When::kAtStart, 1024, [](auto& o) -> auto& { return o.threads; },
+          "solver threads, and threads of the training job; all processors where not given"),
+      numberOption(
+          "longest-call", "S", When::kWhileRunning, 0.001, kMostSeconds,
+          [](auto& o) -> auto& { return o.longest_call; },
+          "cap on a call, and on a stream's time between messages [s]"),
+      numberOption(
+          "publish-patience", "S", When::kAtStart, 0, kMostSeconds, [](auto& o) -> auto& { return o.publish_patience; },
+          "how long a trained model waits for room on a full disk [s]"),
+      numberOption(
+          "drain", "S", When::kWhileRunning, 0, kMostSeconds, [](auto& o) -> auto& { return o.drain; },
+          "asked to stop: how long it still answers while health says NOT_SERVING [s]"),
+      numberOption(
+          "grace", "S", When::kWhileRunning, 0, kMostSeconds, [](auto& o) -> auto& { return o.grace; },
+          "then: how long running calls may go on before they are cancelled [s]"),
+      countOption(
+          "queue-length", "N", When::kWhileRunning, kMostCount, [](auto& o) -> auto& { return o.limits.queue_length; },
+          "requests that may wait for a solver thread"),
+      countOption(
+          "queue-megabytes", "N", When::kWhileRunning, kMostCount,
+          [](auto& o) -> auto& { return o.limits.queue_bytes; }, "their messages together [MiB]", 1 << 20),
+      countOption(
+          "open-streams", "N", When::kWhileRunning, kMostCount, [](auto& o) -> auto& { return o.limits.open_streams; },
+          "streams at a time"),
+      logLevelOption(),
+  };
 }
 
 }  // namespace
 
-std::optional<DaemonOptions> parseOptions(const std::vector<std::string>& words, int default_threads) {
-  DaemonOptions options;
-  options.threads = default_threads;
-  for (std::size_t i = 0; i < words.size(); ++i) {
-    if (words[i] == "--help" || words[i] == "-h") return std::nullopt;
-    const auto equals = words[i].find('=');
-    const auto name = words[i].substr(0, equals);
-    const auto setter = setters().find(name);
-    if (setter == setters().end()) throw InvalidInput(words[i], "is no option of shaped; see shaped --help");
-    if (equals == std::string::npos && i + 1 == words.size()) throw InvalidInput(name, "wants a value");
-    setter->second(options, name, equals == std::string::npos ? words[++i] : words[i].substr(equals + 1));
-  }
-  if (options.store.empty()) throw InvalidInput("--store", "is missing: name a folder for models and datasets");
-  return options;
+const std::vector<OptionSpec>& optionSpecs() {
+  static const auto specs = makeSpecs();
+  return specs;
 }
 
-std::string usage() {
-  return "shaped --store DIR [options]: serves shape models over gRPC\n"
-         "  --listen HOST:PORT    address to serve on, port 0 for any free one (127.0.0.1:50051); unix:PATH works too\n"
-         "  --store DIR           folder of models and datasets, made when missing\n"
-         "  --threads N           solver threads, and threads of the training job (all processors)\n"
-         "  --longest-call S      cap on a call, and on a stream's time between messages [s] (600)\n"
-         "  --publish-patience S  how long a trained model waits for room on a full disk [s] (300)\n"
-         "  --queue-length N      requests that may wait for a solver thread (256)\n"
-         "  --queue-megabytes N   their messages together (512)\n"
-         "  --open-streams N      streams at a time (64)\n"
-         "  --log LEVEL           debug, info, warn or error, to stderr (info)\n"
-         "SIGTERM and SIGINT stop it: no new calls, training jobs cancelled, running calls get 5 seconds.\n";
+void setOptions(const std::vector<GivenOption>& given, DaemonOptions& options) {
+  const auto& specs = optionSpecs();
+  for (const auto& [where, name, value] : given) {
+    const auto spec = std::find_if(specs.begin(), specs.end(), [&](const auto& one) { return one.name == name; });
+    if (spec == specs.end()) throw InvalidInput(where, "is no option of shaped; see shaped --help");
+    spec->set(options, where, value);
+  }
 }
 
 }  // namespace shaped::server

@@ -1,7 +1,7 @@
 #pragma once
 
 #include <filesystem>
-#include <optional>
+#include <functional>
 #include <string>
 #include <vector>
 
@@ -11,19 +11,35 @@ namespace shaped::server {
 
 struct DaemonOptions {
   std::string listen = "127.0.0.1:50051";  ///< host:port, port 0 for any free one, or unix:PATH
-  std::filesystem::path store;             ///< models and datasets; made when missing
+  std::filesystem::path store;             ///< models, datasets and jobs; made when missing
   int threads = 1;                         ///< of the solvers, and of the training job, 1 .. 1024
   double longest_call = 600;               ///< cap on a call, and on a stream's time between messages [s], > 0
   double publish_patience = 300;           ///< how long a trained model waits for room on a full disk [s], >= 0
+  double drain = 0;                        ///< asked to stop: how long it still answers, NOT_SERVING [s], >= 0
+  double grace = 5;                        ///< then: how long running calls may go on [s], >= 0
   AdmissionLimits limits;
   std::string log = "info";  ///< debug, info, warn, error
 };
 
-/// Parses the words of a command line (without the program's name); default_threads stands in for --threads. Nothing
-/// when help is asked for. Throws InvalidInput naming the option.
-std::optional<DaemonOptions> parseOptions(const std::vector<std::string>& words, int default_threads);
+/// One option: `--name VALUE` on the command line, `name: value` in the configuration file.
+struct OptionSpec {
+  std::string name, value_name, help;
+  bool while_running;  ///< whether a changed value takes effect when the configuration is read again
+  /// Takes the value's text; throws InvalidInput naming `where` when it is none of the option.
+  std::function<void(DaemonOptions&, const std::string& where, const std::string& value)> set;
+  /// The value as set() would take it.
+  std::function<std::string(const DaemonOptions&)> show;
+};
 
-/// What --help prints.
-std::string usage();
+/// All options, in the order in which --help lists them.
+const std::vector<OptionSpec>& optionSpecs();
+
+/// An option's value and where it stands: "--threads", or "shaped.yaml:3: threads".
+struct GivenOption {
+  std::string where, name, value;
+};
+
+/// Sets the options in order, so that a later one counts. Throws InvalidInput for an unknown name or a bad value.
+void setOptions(const std::vector<GivenOption>& given, DaemonOptions& options);
 
 }  // namespace shaped::server

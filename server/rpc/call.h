@@ -22,13 +22,15 @@ struct Runtime {
   WorkerPool& light;  ///< what takes milliseconds and must work while the solvers are busy: lists, uploads, jobs
   WorkerPool& heavy;  ///< what takes minutes and must not keep others from a solver: evaluations
   DeadlineTimer& timer;
-  std::chrono::duration<double> longest_call;  ///< cap on a call's deadline; for streams, on the time between messages
+  std::atomic<std::chrono::duration<double>>
+      longest_call;  ///< cap on a call's deadline; for streams, on the time between messages
   std::chrono::duration<double> longest_heavy_call;
   int threads;  ///< of the arena of one heavy call
 };
 
 /// What every call has, whatever its shape: an id, a deadline, a stop token, one line in the log.
-/// Handlers see this class; the reactors that own it are in unary_call.h, server_stream_call.h and incoming_stream_call.h.
+/// Handlers see this class; the reactors that own it are in unary_call.h, server_stream_call.h and
+/// incoming_stream_call.h.
 class Call {
  public:
   /// cap: the longest that the server works on it, whatever the client's deadline.

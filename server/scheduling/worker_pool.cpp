@@ -59,6 +59,11 @@ Load WorkerPool::load() const {
   return loadLocked();
 }
 
+void WorkerPool::setLimits(const AdmissionLimits& limits) {
+  const std::scoped_lock lock(mutex_);
+  limits_ = limits;
+}
+
 Load WorkerPool::loadLocked() const {
   return {static_cast<int>(threads_.size()), busy_, queue_.size(), queue_bytes_, open_streams_, mean_seconds_};
 }

@@ -39,6 +39,8 @@ class WorkerPool {
   void closeStream();
 
   Load load() const;
+  /// What is admitted from here on.
+  void setLimits(const AdmissionLimits& limits);
 
  private:
   struct Task {
@@ -50,8 +52,8 @@ class WorkerPool {
   void serve();
   Load loadLocked() const;
 
-  const AdmissionLimits limits_;
   mutable std::mutex mutex_;
+  AdmissionLimits limits_;
   std::condition_variable wake_;
   std::deque<Task> queue_;
   std::size_t queue_bytes_ = 0, busy_ = 0, open_streams_ = 0;

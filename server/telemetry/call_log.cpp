@@ -20,16 +20,24 @@ std::string oneLine(std::string text) {
 
 }  // namespace
 
+void requireLogLevel(const std::string& level, const std::string& where) {
+  for (const auto* known : {"debug", "info", "warn", "error"})
+    if (level == known) return;
+  throw InvalidInput(where, "\"" + level + "\" is no level; use debug, info, warn or error");
+}
+
 void startLog(const std::string& level) {
-  const auto parsed = spdlog::level::from_str(level == "warn" ? "warning" : level);
-  if (parsed == spdlog::level::off)
-    throw InvalidInput("--log", "\"" + level + "\" is no level; use debug, info, warn or error");
   spdlog::drop("shaped");
   auto logger = spdlog::stderr_logger_mt("shaped");
-  logger->set_level(parsed);
   logger->set_pattern("%Y-%m-%dT%H:%M:%S.%e%z %l %v");
   logger->flush_on(spdlog::level::info);
   spdlog::set_default_logger(std::move(logger));
+  setLogLevel(level);
+}
+
+void setLogLevel(const std::string& level) {
+  requireLogLevel(level, "--log");
+  spdlog::default_logger()->set_level(spdlog::level::from_str(level));
 }
 
 void logCall(const CallRecord& record, bool servers_fault) {

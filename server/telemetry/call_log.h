@@ -15,9 +15,14 @@ struct CallRecord {
   double seconds = 0;   ///< from arrival to answer
 };
 
-/// Sets level and pattern of the process's log on stderr. level: trace, debug, info, warn, error; throws InvalidInput
-/// for another. May be called again.
+/// Throws InvalidInput naming `where` unless the level is debug, info, warn or error.
+void requireLogLevel(const std::string& level, const std::string& where);
+
+/// Sets level and pattern of the process's log on stderr, before other threads write to it. Throws as
+/// requireLogLevel().
 void startLog(const std::string& level);
+/// Changes the level, at any time, from any thread. Throws as requireLogLevel().
+void setLogLevel(const std::string& level);
 
 /// Writes the record as one line: info when OK, warn for what the client did, error for what the server did.
 void logCall(const CallRecord& record, bool servers_fault);
