@@ -17,12 +17,19 @@ namespace shaped::client {
 /// A call that the daemon (or the way to it) answered with an error.
 class RpcError : public std::runtime_error {
  public:
-  explicit RpcError(const grpc::Status& status)
-      : std::runtime_error(status.error_message()), code_(status.error_code()) {}
+  explicit RpcError(const grpc::Status& status);
   grpc::StatusCode code() const { return code_; }
+  /// The daemon's reason (docs/api.md), "SERVER_BUSY" say; empty when something else answered.
+  const std::string& reason() const { return reason_; }
+  /// The field of the request that was wrong; empty where none was.
+  const std::string& field() const { return field_; }
+  /// When the same request may succeed, where the daemon knows.
+  std::optional<std::chrono::milliseconds> retryAfter() const { return retry_after_; }
 
  private:
   grpc::StatusCode code_;
+  std::string reason_, field_;
+  std::optional<std::chrono::milliseconds> retry_after_;
 };
 
 /// Throws RpcError unless the status is OK.

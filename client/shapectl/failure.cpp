@@ -30,12 +30,24 @@ constexpr const char* nameOf(ExitCode code) {
   return "internal";
 }
 
-ExitCode report(const Session& session, ExitCode code, const std::string& message) {
-  if (session.json)
-    std::cout << nlohmann::json{{"error", {{"kind", nameOf(code)}, {"message", message}}}}.dump(
-                     2, ' ', false, nlohmann::json::error_handler_t::replace)
+/// What the daemon told for programs.
+nlohmann::json detailsOf(const client::RpcError& error) {
+  nlohmann::json details = nlohmann::json::object();
+  if (!error.reason().empty()) details["reason"] = error.reason();
+  if (!error.field().empty()) details["field"] = error.field();
+  if (const auto delay = error.retryAfter())
+    details["retry_after_seconds"] = 1e-3 * static_cast<double>(delay->count());
+  return details;
+}
+
+ExitCode report(const Session& session, ExitCode code, const std::string& message,
+                nlohmann::json details = nlohmann::json::object()) {
+  if (session.json) {
+    details["kind"] = nameOf(code);
+    details["message"] = message;
+    std::cout << nlohmann::json{{"error", details}}.dump(2, ' ', false, nlohmann::json::error_handler_t::replace)
               << "\n";
-  else
+  } else
     std::cerr << "shapectl: " << message << "\n";
   return code;
 }
@@ -77,7 +89,8 @@ ExitCode reportingFailures(const Session& session, const std::function<ExitCode(
     return report(session, code,
                   unreachable ? "no daemon answers at " + session.server + " (" + error.what() +
                                     "); start shaped or name another with --server"
-                              : error.what());
+                              : error.what(),
+                  detailsOf(error));
   } catch (const std::exception& error) {
     return report(session, ExitCode::kInternal, error.what());
   }

@@ -1,7 +1,5 @@
 #include "server/convert/mesh.h"
 
-#include <limits>
-
 #include "core/numerics/error.h"
 
 namespace shaped::server {
@@ -22,11 +20,14 @@ Vertices pointsFromProto(const PackedPositions& packed, Eigen::Index count, cons
   return Eigen::Map<const PackedMatrix>(packed.data(), count, 3).cast<double>();
 }
 
-Faces facesFromProto(const PackedFaces& packed, std::int64_t vertex_count, const std::string& field) {
+Faces facesFromProto(const PackedFaces& packed, std::int64_t vertex_count, const Limits& limits,
+                     const std::string& field) {
   if (packed.empty() || packed.size() % 3 != 0)
     throw InvalidInput(field, "has " + std::to_string(packed.size()) + " indices, want three for each face");
-  if (vertex_count < 3 || vertex_count > std::numeric_limits<std::int32_t>::max())
+  if (vertex_count < 3)
     throw InvalidInput(field, "refers to " + std::to_string(vertex_count) + " vertices; a mesh needs at least three");
+  requireAtMost(vertex_count, limits.vertices, field, "vertices to refer to");
+  requireAtMost(packed.size() / 3, limits.faces, field, "faces");
   for (int i = 0; i < packed.size(); ++i)
     if (packed[i] >= static_cast<std::uint64_t>(vertex_count))
       throw InvalidInput(
@@ -49,10 +50,10 @@ Vertices shapeFromProto(const v1::Shape& shape, const Topology& topology, const 
   return vertices;
 }
 
-OwnedMesh meshFromProto(const v1::Mesh& mesh, const std::string& field) {
+OwnedMesh meshFromProto(const v1::Mesh& mesh, const Limits& limits, const std::string& field) {
   const std::int64_t vertex_count = mesh.positions_size() / 3;
   auto vertices = pointsFromProto(mesh.positions(), vertex_count, field + ".positions");
-  auto faces = facesFromProto(mesh.faces(), vertex_count, field + ".faces");
+  auto faces = facesFromProto(mesh.faces(), vertex_count, limits, field + ".faces");
   try {
     auto topology = std::make_shared<const Topology>(static_cast<std::int32_t>(vertex_count), std::move(faces));
     requireOneComponent(*topology, "faces");

@@ -53,7 +53,8 @@ void toProto(const ServedModel& model, v1::ModelDescription& description) {
   for (const double value : parts.pga.eigenvalues) pga.add_eigenvalues(value);
 }
 
-SubmanifoldPoint coefficientsFromProto(const v1::Coefficients& coefficients) {
+SubmanifoldPoint coefficientsFromProto(const v1::Coefficients& coefficients, const Limits& limits) {
+  requireAtMost(coefficients.alpha_size(), limits.coefficients, "coefficients.alpha", "weights");
   SubmanifoldPoint point;
   point.alpha = Eigen::Map<const Eigen::VectorXd>(coefficients.alpha().data(), coefficients.alpha_size());
   point.scale = coefficients.scale();

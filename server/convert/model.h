@@ -1,6 +1,7 @@
 #pragma once
 
 #include "core/model/shell_pga_tasks.h"
+#include "server/convert/limits.h"
 #include "server/models/model_store.h"
 #include "shaped/v1/model.pb.h"
 
@@ -11,8 +12,9 @@ void toProto(const ModelStore::Entry& entry, v1::ModelDescription& description);
 /// Everything.
 void toProto(const ServedModel& model, v1::ModelDescription& description);
 
-/// The weights as they came; whether they are a point of a model is for the model to say.
-SubmanifoldPoint coefficientsFromProto(const v1::Coefficients& coefficients);
+/// The weights as they came; whether they are a point of a model is for the model to say. Throws InvalidInput when they
+/// are more than the limits allow.
+SubmanifoldPoint coefficientsFromProto(const v1::Coefficients& coefficients, const Limits& limits);
 void toProto(const SubmanifoldPoint& point, v1::Coefficients& coefficients);
 void toProto(const ShellPgaScore& score, v1::Score& message);
 

@@ -6,7 +6,6 @@
 
 #include "core/numerics/error.h"
 #include "server/jobs/arena.h"
-#include "server/rpc/limits.h"
 #include "server/rpc/training.h"
 #include "server/telemetry/call_log.h"
 
@@ -28,8 +27,8 @@ Daemon::Daemon(const DaemonOptions& options)
       lock_(options.store),
       models_(options.store / "models"),
       datasets_(options.store / "datasets"),
-      pool_(options.threads, options.limits, alone),
-      light_(kLightThreads, options.limits, alone),
+      pool_(options.threads, options.admission, alone),
+      light_(kLightThreads, options.admission, alone),
       heavy_(1, kHeavyLimits, {}),
       jobs_(job_registry_, {.running = 1, .waiting = 64, .threads = options.threads}),
       runtime_{pool_,
@@ -40,12 +39,13 @@ Daemon::Daemon(const DaemonOptions& options)
                kLongestHeavyCall,
                options.threads},
       models_service_(runtime_, models_),
-      datasets_service_(runtime_, datasets_),
+      datasets_service_(runtime_, options_.limits, datasets_),
       jobs_service_(runtime_, job_registry_, jobs_,
                     [training = TrainingContext{datasets_, models_, jobs_,
                                                 std::chrono::duration<double>(options.publish_patience)}](
                         const v1::TrainRequest& request) { return startTraining(training, request); }),
-      shapes_service_(runtime_, models_, datasets_) {
+      shapes_service_(runtime_, options_.limits, models_, datasets_),
+      server_service_(runtime_, options_.limits, "shaped " SHAPED_VERSION) {
   listen(options.listen);
 }
 
@@ -55,13 +55,14 @@ void Daemon::listen(const std::string& address) {
   grpc::ServerBuilder builder;
   int port = -1;
   builder.AddListeningPort(address, grpc::InsecureServerCredentials(), &port);
-  builder.SetMaxReceiveMessageSize(kLargestMessage);
-  builder.SetMaxSendMessageSize(kLargestMessage);
+  builder.SetMaxReceiveMessageSize(static_cast<int>(options_.limits.message_bytes));
+  builder.SetMaxSendMessageSize(static_cast<int>(options_.limits.message_bytes));
   // Two daemons on one port would share its connections at random.
   builder.AddChannelArgument(GRPC_ARG_ALLOW_REUSEPORT, 0);
   for (grpc::Service* service :
        {static_cast<grpc::Service*>(&models_service_), static_cast<grpc::Service*>(&datasets_service_),
-        static_cast<grpc::Service*>(&jobs_service_), static_cast<grpc::Service*>(&shapes_service_)})
+        static_cast<grpc::Service*>(&jobs_service_), static_cast<grpc::Service*>(&shapes_service_),
+        static_cast<grpc::Service*>(&server_service_)})
     builder.RegisterService(service);
   server_ = builder.BuildAndStart();
   const bool by_port = !address.starts_with("unix:");
@@ -87,8 +88,8 @@ void Daemon::reload(const DaemonOptions& options) {
 
 void Daemon::useLimits() {
   setLogLevel(options_.log);
-  pool_.setLimits(options_.limits);
-  light_.setLimits(options_.limits);
+  pool_.setLimits(options_.admission);
+  light_.setLimits(options_.admission);
   runtime_.longest_call = std::chrono::duration<double>(options_.longest_call);
 }
 

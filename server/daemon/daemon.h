@@ -11,6 +11,7 @@
 #include "server/rpc/datasets_service.h"
 #include "server/rpc/jobs_service.h"
 #include "server/rpc/models_service.h"
+#include "server/rpc/server_service.h"
 #include "server/rpc/shapes_service.h"
 
 namespace shaped::server {
@@ -54,6 +55,7 @@ class Daemon {
   DatasetsService datasets_service_;
   JobsService jobs_service_;
   ShapesService shapes_service_;
+  ServerService server_service_;
   std::string address_;
   std::unique_ptr<grpc::Server> server_;
 };

@@ -71,6 +71,7 @@ OptionSpec logLevelOption() {
 
 constexpr std::int64_t kMostCount = 1 << 20;
 constexpr double kMostSeconds = 1e6;
+constexpr std::int64_t kMostVertices = 100'000'000;
 
 std::vector<OptionSpec> makeSpecs() {
   return {
@@ -97,14 +98,26 @@ std::vector<OptionSpec> makeSpecs() {
           "grace", "S", When::kWhileRunning, 0, kMostSeconds, [](auto& o) -> auto& { return o.grace; },
           "then: how long running calls may go on before they are cancelled [s]"),
       countOption(
-          "queue-length", "N", When::kWhileRunning, kMostCount, [](auto& o) -> auto& { return o.limits.queue_length; },
-          "requests that may wait for a solver thread"),
+          "queue-length", "N", When::kWhileRunning, kMostCount,
+          [](auto& o) -> auto& { return o.admission.queue_length; }, "requests that may wait for a solver thread"),
       countOption(
           "queue-megabytes", "N", When::kWhileRunning, kMostCount,
-          [](auto& o) -> auto& { return o.limits.queue_bytes; }, "their messages together [MiB]", 1 << 20),
+          [](auto& o) -> auto& { return o.admission.queue_bytes; }, "their messages together [MiB]", 1 << 20),
       countOption(
-          "open-streams", "N", When::kWhileRunning, kMostCount, [](auto& o) -> auto& { return o.limits.open_streams; },
-          "streams at a time"),
+          "open-streams", "N", When::kWhileRunning, kMostCount,
+          [](auto& o) -> auto& { return o.admission.open_streams; }, "streams at a time"),
+      countOption(
+          "max-vertices", "N", When::kAtStart, kMostVertices, [](auto& o) -> auto& { return o.limits.vertices; },
+          "largest mesh that is taken"),
+      countOption(
+          "max-faces", "N", When::kAtStart, 2 * kMostVertices, [](auto& o) -> auto& { return o.limits.faces; },
+          "its faces"),
+      countOption(
+          "max-frames", "N", When::kAtStart, 1'000'000'000, [](auto& o) -> auto& { return o.limits.frames; },
+          "largest dataset that is taken"),
+      countOption(
+          "max-message-megabytes", "N", When::kAtStart, 1024, [](auto& o) -> auto& { return o.limits.message_bytes; },
+          "largest message, either way [MiB]", 1 << 20),
       logLevelOption(),
   };
 }

@@ -5,6 +5,7 @@
 #include <string>
 #include <vector>
 
+#include "server/convert/limits.h"
 #include "server/scheduling/admission.h"
 
 namespace shaped::server {
@@ -17,7 +18,8 @@ struct DaemonOptions {
   double publish_patience = 300;           ///< how long a trained model waits for room on a full disk [s], >= 0
   double drain = 0;                        ///< asked to stop: how long it still answers, NOT_SERVING [s], >= 0
   double grace = 5;                        ///< then: how long running calls may go on [s], >= 0
-  AdmissionLimits limits;
+  AdmissionLimits admission;
+  Limits limits;             ///< of requests
   std::string log = "info";  ///< debug, info, warn, error
 };
 

@@ -11,47 +11,49 @@
 namespace shaped::server {
 namespace {
 
-using grpc::Status;
+// Jobs take minutes: no use in asking sooner.
+constexpr std::chrono::seconds kBusyDelay(10);
 
-Status fileStatus(const std::string& text) {
-  if (saysDiskFull(text)) return {grpc::RESOURCE_EXHAUSTED, text + "; free space in the store and try again"};
-  return {grpc::INTERNAL, text};
+ErrorReport stoppedReport(StopReason reason) {
+  if (reason == StopReason::kDeadline)
+    return {
+        grpc::DEADLINE_EXCEEDED, "the deadline passed before there was an answer", Reason::kDeadlineExceeded, {}, {}};
+  return {grpc::CANCELLED, "cancelled by the client", Reason::kCancelled, {}, {}};
 }
 
-// gRPC cuts what exceeds its header limit of 8 KiB together with the whole status.
-std::string shortened(std::string text) {
-  constexpr std::size_t longest = 2000;
-  if (text.size() > longest) text = text.substr(0, longest) + " ...";
-  return text;
+ErrorReport fileReport(const std::string& text) {
+  if (saysDiskFull(text))
+    return {grpc::RESOURCE_EXHAUSTED, text + "; free space in the store and try again", Reason::kDiskFull, {}, {}};
+  return {grpc::INTERNAL, text, Reason::kFileFailure, {}, {}};
 }
 
-Status unboundedStatusOf(const std::exception_ptr& error, StopReason stopped) {
+ErrorReport reportOf(const std::exception_ptr& error, StopReason stopped) {
   try {
     std::rethrow_exception(error);
   } catch (const Stopped&) {
-    return stoppedStatus(stopped);
+    return stoppedReport(stopped);
   } catch (const ModelNotFound& problem) {
-    return {grpc::NOT_FOUND, problem.what()};
+    return {grpc::NOT_FOUND, problem.what(), Reason::kModelNotFound, {}, {}};
   } catch (const InvalidInput& problem) {
-    return {grpc::INVALID_ARGUMENT, problem.what()};
+    return {grpc::INVALID_ARGUMENT, problem.what(), Reason::kInvalidField, problem.field(), {}};
   } catch (const NotFound& problem) {
-    return {grpc::NOT_FOUND, problem.what()};
+    return {grpc::NOT_FOUND, problem.what(), Reason::kNotFound, {}, {}};
   } catch (const AlreadyExists& problem) {
-    return {grpc::ALREADY_EXISTS, problem.what()};
+    return {grpc::ALREADY_EXISTS, problem.what(), Reason::kAlreadyExists, {}, {}};
   } catch (const Busy& problem) {
-    return {grpc::RESOURCE_EXHAUSTED, problem.what()};
+    return {grpc::RESOURCE_EXHAUSTED, problem.what(), Reason::kTooManyJobs, {}, kBusyDelay};
   } catch (const Corrupted& problem) {
-    return {grpc::DATA_LOSS, problem.what()};
+    return {grpc::DATA_LOSS, problem.what(), Reason::kDataDamaged, {}, {}};
   } catch (const FileError& problem) {
-    return fileStatus(problem.what());
+    return fileReport(problem.what());
   } catch (const std::system_error& problem) {
-    return fileStatus(problem.what());
+    return fileReport(problem.what());
   } catch (const std::bad_alloc&) {
-    return {grpc::RESOURCE_EXHAUSTED, "not enough memory for this request"};
+    return {grpc::RESOURCE_EXHAUSTED, "not enough memory for this request", Reason::kOutOfMemory, {}, {}};
   } catch (const std::exception& problem) {
-    return {grpc::INTERNAL, problem.what()};
+    return {grpc::INTERNAL, problem.what(), Reason::kInternal, {}, {}};
   } catch (...) {
-    return {grpc::INTERNAL, "an unknown error"};
+    return {grpc::INTERNAL, "an unknown error", Reason::kInternal, {}, {}};
   }
 }
 
@@ -63,16 +65,11 @@ bool saysDiskFull(const std::string& text) {
   return false;
 }
 
-Status statusOf(const std::exception_ptr& error, StopReason stopped) {
-  const auto status = unboundedStatusOf(error, stopped);
-  return {status.error_code(), shortened(status.error_message())};
+grpc::Status statusOf(const std::exception_ptr& error, StopReason stopped) {
+  return statusOf(reportOf(error, stopped));
 }
 
-Status stoppedStatus(StopReason reason) {
-  if (reason == StopReason::kDeadline)
-    return {grpc::DEADLINE_EXCEEDED, "the deadline passed before there was an answer"};
-  return {grpc::CANCELLED, "cancelled by the client"};
-}
+grpc::Status stoppedStatus(StopReason reason) { return statusOf(stoppedReport(reason)); }
 
 std::string nameOf(grpc::StatusCode code) {
   switch (code) {

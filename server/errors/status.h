@@ -5,15 +5,20 @@
 #include <exception>
 #include <string>
 
+#include "server/errors/report.h"
 #include "server/scheduling/stopper.h"
 
 namespace shaped::server {
 
-/// The status for an exception that ended a request; the one place where this is decided.
-///   ModelNotFound -> NOT_FOUND, any other InvalidInput -> INVALID_ARGUMENT (the text names the field)   NotFound ->
-///   NOT_FOUND   AlreadyExists -> ALREADY_EXISTS Busy -> RESOURCE_EXHAUSTED   Corrupted -> DATA_LOSS   Stopped -> see
-///   stoppedStatus FileError and system errors -> RESOURCE_EXHAUSTED when the disk is full, else INTERNAL
-///   std::bad_alloc -> RESOURCE_EXHAUSTED anything else -> INTERNAL
+/// The status for an exception that ended a request, with its details; the one place where this is decided.
+///   ModelNotFound, NotFound -> NOT_FOUND
+///   any other InvalidInput -> INVALID_ARGUMENT; text and details name the field
+///   AlreadyExists -> ALREADY_EXISTS
+///   Busy, std::bad_alloc -> RESOURCE_EXHAUSTED
+///   Corrupted -> DATA_LOSS
+///   Stopped -> see stoppedStatus
+///   FileError, std::system_error -> RESOURCE_EXHAUSTED when the disk is full, else INTERNAL
+///   anything else -> INTERNAL
 grpc::Status statusOf(const std::exception_ptr& error, StopReason stopped);
 
 /// The client went away: CANCELLED; time is up: DEADLINE_EXCEEDED.

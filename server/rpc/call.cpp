@@ -58,7 +58,8 @@ void Call::stop(StopReason reason) {
 
 grpc::Status Call::refusal(const Decision& decision) {
   context_.AddTrailingMetadata("grpc-retry-pushback-ms", std::to_string(decision.retry_after.count()));
-  return {grpc::RESOURCE_EXHAUSTED, decision.reason};
+  return statusOf(
+      ErrorReport{grpc::RESOURCE_EXHAUSTED, decision.reason, Reason::kServerBusy, {}, decision.retry_after});
 }
 
 DeadlineTimer::Clock::time_point Call::deadline() const {

@@ -11,7 +11,7 @@ namespace {
 
 class UploadHandler final : public StreamHandler<v1::UploadDatasetRequest, v1::UploadDatasetResponse> {
  public:
-  explicit UploadHandler(DatasetStore& store) : store_(store) {}
+  UploadHandler(DatasetStore& store, const Limits& limits) : store_(store), limits_(limits) {}
 
   bool message(const v1::UploadDatasetRequest& request, v1::UploadDatasetResponse&, Call&) override {
     if (request.has_header())
@@ -32,7 +32,8 @@ class UploadHandler final : public StreamHandler<v1::UploadDatasetRequest, v1::U
  private:
   void begin(const v1::UploadDatasetRequest::Header& header) {
     if (upload_) throw InvalidInput("header", "came a second time");
-    auto faces = facesFromProto(header.faces(), header.vertex_count(), "header.faces");
+    auto faces = facesFromProto(header.faces(), header.vertex_count(), limits_, "header.faces");
+    requireAtMost(header.frames(), limits_.frames, "header.frames", "frames");
     upload_ = store_.begin(header.name(), static_cast<std::int32_t>(header.vertex_count()), std::move(faces),
                            header.frames());
     if (header.template_positions().empty()) return;
@@ -44,7 +45,7 @@ class UploadHandler final : public StreamHandler<v1::UploadDatasetRequest, v1::U
     if (!upload_) throw InvalidInput("header", "is missing: the first message must be it");
     const auto label = frame.label().empty() ? "" : " (" + frame.label() + ")";
     const auto field = "frames[" + std::to_string(frame_count_++) + "]" + label;
-    const auto vertex_count = upload_->topology().vertexCount();
+    const std::int64_t vertex_count = upload_->topology().vertexCount();
     if (frame.positions_size() != 3 * vertex_count)
       throw InvalidInput(field, "has " + std::to_string(frame.positions_size()) + " coordinates, want " +
                                     std::to_string(3 * vertex_count) + " for " + std::to_string(vertex_count) +
@@ -53,6 +54,7 @@ class UploadHandler final : public StreamHandler<v1::UploadDatasetRequest, v1::U
   }
 
   DatasetStore& store_;
+  const Limits& limits_;
   std::unique_ptr<DatasetUpload> upload_;
   std::int64_t frame_count_ = 0;
 };
@@ -62,7 +64,7 @@ class UploadHandler final : public StreamHandler<v1::UploadDatasetRequest, v1::U
 grpc::ServerReadReactor<v1::UploadDatasetRequest>* DatasetsService::Upload(grpc::CallbackServerContext* context,
                                                                            v1::UploadDatasetResponse* response) {
   return startClientStream<v1::UploadDatasetRequest, v1::UploadDatasetResponse>(
-      runtime_, runtime_.light, "Datasets.Upload", context, response, std::make_unique<UploadHandler>(store_));
+      runtime_, runtime_.light, "Datasets.Upload", context, response, std::make_unique<UploadHandler>(store_, limits_));
 }
 
 grpc::ServerUnaryReactor* DatasetsService::List(grpc::CallbackServerContext* context,

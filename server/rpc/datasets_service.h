@@ -1,5 +1,6 @@
 #pragma once
 
+#include "server/convert/limits.h"
 #include "server/datasets/dataset_store.h"
 #include "server/rpc/call.h"
 #include "shaped/v1/datasets.grpc.pb.h"
@@ -8,7 +9,8 @@ namespace shaped::server {
 
 class DatasetsService final : public v1::Datasets::CallbackService {
  public:
-  DatasetsService(Runtime& runtime, DatasetStore& store) : runtime_(runtime), store_(store) {}
+  DatasetsService(Runtime& runtime, const Limits& limits, DatasetStore& store)
+      : runtime_(runtime), limits_(limits), store_(store) {}
 
   grpc::ServerReadReactor<v1::UploadDatasetRequest>* Upload(grpc::CallbackServerContext* context,
                                                             v1::UploadDatasetResponse* response) override;
@@ -19,6 +21,7 @@ class DatasetsService final : public v1::Datasets::CallbackService {
 
  private:
   Runtime& runtime_;
+  const Limits& limits_;
   DatasetStore& store_;
 };
 

@@ -13,15 +13,11 @@
 namespace shaped::server {
 namespace {
 
-constexpr std::uint32_t kMostPathSteps = 1024;
-constexpr int kMostTimes = 10000;
 constexpr double kFarthestTime = 10;
 
-void check(const v1::InterpolateRequest& request) {
-  if (request.path_steps() > kMostPathSteps)
-    throw InvalidInput("path_steps", "= " + std::to_string(request.path_steps()) + ", want 1 to 1024");
-  if (request.times_size() > kMostTimes)
-    throw InvalidInput("times", "are " + std::to_string(request.times_size()) + ", want at most 10000");
+void check(const v1::InterpolateRequest& request, const Limits& limits) {
+  requireAtMost(request.path_steps(), limits.path_steps, "path_steps", "steps");
+  requireAtMost(request.times_size(), limits.times, "times", "times");
   for (int i = 0; i < request.times_size(); ++i)
     if (!(std::abs(request.times(i)) <= kFarthestTime))
       throw InvalidInput("times[" + std::to_string(i) + "]",
@@ -50,10 +46,10 @@ v1::InterpolateResponse summaryOf(const GeodesicCalculus& calculus, const Solved
 
 }  // namespace
 
-void interpolate(const v1::InterpolateRequest& request,
+void interpolate(const Limits& limits, const v1::InterpolateRequest& request,
                  const std::function<void(const v1::InterpolateResponse&)>& write, Call& call) {
-  check(request);
-  const auto from = meshFromProto(request.from(), "from");
+  check(request, limits);
+  const auto from = meshFromProto(request.from(), limits, "from");
   const auto to = shapeFromProto(request.to(), *from.topology, "to");
   const double bending = request.bending() > 0 ? request.bending() : defaultBending(from.vertices);
   const int steps = request.path_steps() > 0 ? static_cast<int>(request.path_steps()) : 4;

@@ -15,7 +15,7 @@ namespace {
 
 class MarkerStream final : public StreamHandler<v1::FitMarkersRequest, v1::FitMarkersResponse> {
  public:
-  explicit MarkerStream(ModelStore& store) : store_(store) {}
+  MarkerStream(ModelStore& store, const Limits& limits) : store_(store), limits_(limits) {}
 
   bool message(const v1::FitMarkersRequest& request, v1::FitMarkersResponse& response, Call& call) override {
     if (request.has_setup()) {
@@ -37,6 +37,7 @@ class MarkerStream final : public StreamHandler<v1::FitMarkersRequest, v1::FitMa
     if (fitter_) throw InvalidInput("setup", "came a second time");
     served_ = pinModel(store_, setup, call);
     const auto& model = *served_->shell_pga;
+    requireAtMost(setup.marker_set().markers_size(), limits_.markers, "setup.marker_set", "markers");
     const auto markers = markerSetFromProto(setup.marker_set(), setup.labels());
     MarkerTrackerOptions options;
     if (setup.prior_weight() != 0) options.prior_weight = setup.prior_weight();
@@ -51,10 +52,7 @@ class MarkerStream final : public StreamHandler<v1::FitMarkersRequest, v1::FitMa
   }
 
   void takeCalibration(const v1::FitMarkersRequest::Setup& setup) {
-    constexpr int most = 16;
-    if (setup.calibration_size() > most)
-      throw InvalidInput("setup.calibration", "has " + std::to_string(setup.calibration_size()) +
-                                                  " frames, want at most " + std::to_string(most));
+    requireAtMost(setup.calibration_size(), limits_.calibration_frames, "setup.calibration", "frames");
     for (int i = 0; i < setup.calibration_size(); ++i)
       calibration_.push_back(
           markersFromProto(setup.calibration(i), marker_count_, "setup.calibration[" + std::to_string(i) + "]"));
@@ -79,6 +77,7 @@ class MarkerStream final : public StreamHandler<v1::FitMarkersRequest, v1::FitMa
   }
 
   ModelStore& store_;
+  const Limits& limits_;
   ServedModelPtr served_;
   std::optional<MarkerFitter> fitter_;
   std::vector<MarkerPositions> calibration_;  ///< frames that are still to tell the subject's size
@@ -88,8 +87,9 @@ class MarkerStream final : public StreamHandler<v1::FitMarkersRequest, v1::FitMa
 
 }  // namespace
 
-std::unique_ptr<StreamHandler<v1::FitMarkersRequest, v1::FitMarkersResponse>> makeMarkerStream(ModelStore& store) {
-  return std::make_unique<MarkerStream>(store);
+std::unique_ptr<StreamHandler<v1::FitMarkersRequest, v1::FitMarkersResponse>> makeMarkerStream(ModelStore& store,
+                                                                                               const Limits& limits) {
+  return std::make_unique<MarkerStream>(store, limits);
 }
 
 }  // namespace shaped::server

@@ -38,18 +38,21 @@ void project(ModelStore& store, const v1::ProjectRequest& request, v1::ProjectRe
   toProto(projection.score, *response.mutable_score());
 }
 
-void synthesize(ModelStore& store, const v1::SynthesizeRequest& request, v1::SynthesizeResponse& response, Call& call) {
+void synthesize(ModelStore& store, const Limits& limits, const v1::SynthesizeRequest& request,
+                v1::SynthesizeResponse& response, Call& call) {
   const auto served = pinModel(store, request, call);
   const auto& model = *served->shell_pga;
-  const auto solved = synthesize(model, coefficientsFromProto(request.coefficients()),
+  const auto solved = synthesize(model, coefficientsFromProto(request.coefficients(), limits),
                                  {.fine = request.fine(), .stop = call.stopToken()});
   setAnswer(*served, solved, solved.solution.smallest_area_ratio, call, response);
   toProto(solved.solution.shape, model.topology(), *response.mutable_shape());
 }
 
-void edit(ModelStore& store, const v1::EditRequest& request, v1::EditResponse& response, Call& call) {
+void edit(ModelStore& store, const Limits& limits, const v1::EditRequest& request, v1::EditResponse& response,
+          Call& call) {
   const auto served = pinModel(store, request, call);
   const auto& model = *served->shell_pga;
+  requireAtMost(request.handles_size(), limits.handles, "handles", "handles");
   std::vector<Handle> handles;
   for (const auto& handle : request.handles())
     handles.push_back(handleFromProto(handle, model.topology(), handles.size()));

@@ -1,5 +1,6 @@
 #pragma once
 
+#include "server/convert/limits.h"
 #include "server/models/model_store.h"
 #include "server/rpc/call.h"
 #include "shaped/v1/shapes.pb.h"
@@ -8,8 +9,10 @@ namespace shaped::server {
 
 // The unary methods of Shapes on a solver thread: translate, call, translate. Throw as statusOf says.
 void project(ModelStore& store, const v1::ProjectRequest& request, v1::ProjectResponse& response, Call& call);
-void synthesize(ModelStore& store, const v1::SynthesizeRequest& request, v1::SynthesizeResponse& response, Call& call);
-void edit(ModelStore& store, const v1::EditRequest& request, v1::EditResponse& response, Call& call);
+void synthesize(ModelStore& store, const Limits& limits, const v1::SynthesizeRequest& request,
+                v1::SynthesizeResponse& response, Call& call);
+void edit(ModelStore& store, const Limits& limits, const v1::EditRequest& request, v1::EditResponse& response,
+          Call& call);
 void score(ModelStore& store, const v1::ScoreRequest& request, v1::ScoreResponse& response, Call& call);
 
 }  // namespace shaped::server

@@ -25,25 +25,26 @@ grpc::ServerUnaryReactor* ShapesService::Synthesize(Context* context, const v1::
                                                     v1::SynthesizeResponse* response) {
   return startUnary<v1::SynthesizeRequest, v1::SynthesizeResponse>(
       runtime_, runtime_.pool, "Shapes.Synthesize", context, request, response,
-      [this](const auto& wanted, auto& answer, Call& call) { synthesize(models_, wanted, answer, call); });
+      [this](const auto& wanted, auto& answer, Call& call) { synthesize(models_, limits_, wanted, answer, call); });
 }
 
 grpc::ServerWriteReactor<v1::InterpolateResponse>* ShapesService::Interpolate(Context* context,
                                                                               const v1::InterpolateRequest* request) {
   return startServerStream<v1::InterpolateRequest, v1::InterpolateResponse>(
-      runtime_, runtime_.pool, "Shapes.Interpolate", context, request, interpolate);
+      runtime_, runtime_.pool, "Shapes.Interpolate", context, request,
+      [this](const auto& wanted, const auto& write, Call& call) { interpolate(limits_, wanted, write, call); });
 }
 
 grpc::ServerUnaryReactor* ShapesService::Edit(Context* context, const v1::EditRequest* request,
                                               v1::EditResponse* response) {
   return startUnary<v1::EditRequest, v1::EditResponse>(
       runtime_, runtime_.pool, "Shapes.Edit", context, request, response,
-      [this](const auto& wanted, auto& answer, Call& call) { edit(models_, wanted, answer, call); });
+      [this](const auto& wanted, auto& answer, Call& call) { edit(models_, limits_, wanted, answer, call); });
 }
 
 grpc::ServerBidiReactor<v1::FitMarkersRequest, v1::FitMarkersResponse>* ShapesService::FitMarkers(Context* context) {
   return startBidi<v1::FitMarkersRequest, v1::FitMarkersResponse>(runtime_, runtime_.pool, "Shapes.FitMarkers", context,
-                                                                  makeMarkerStream(models_));
+                                                                  makeMarkerStream(models_, limits_));
 }
 
 grpc::ServerUnaryReactor* ShapesService::Score(Context* context, const v1::ScoreRequest* request,

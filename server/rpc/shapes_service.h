@@ -1,5 +1,6 @@
 #pragma once
 
+#include "server/convert/limits.h"
 #include "server/datasets/dataset_store.h"
 #include "server/models/model_store.h"
 #include "server/rpc/call.h"
@@ -9,8 +10,8 @@ namespace shaped::server {
 
 class ShapesService final : public v1::Shapes::CallbackService {
  public:
-  ShapesService(Runtime& runtime, ModelStore& models, DatasetStore& datasets)
-      : runtime_(runtime), models_(models), datasets_(datasets) {}
+  ShapesService(Runtime& runtime, const Limits& limits, ModelStore& models, DatasetStore& datasets)
+      : runtime_(runtime), limits_(limits), models_(models), datasets_(datasets) {}
 
   grpc::ServerUnaryReactor* Project(grpc::CallbackServerContext* context, const v1::ProjectRequest* request,
                                     v1::ProjectResponse* response) override;
@@ -29,6 +30,7 @@ class ShapesService final : public v1::Shapes::CallbackService {
 
  private:
   Runtime& runtime_;
+  const Limits& limits_;
   ModelStore& models_;
   DatasetStore& datasets_;
 };

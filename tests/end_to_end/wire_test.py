@@ -4,7 +4,7 @@ import unittest
 
 import grpc
 
-from support import DaemonCase
+from support import NOT_FOUND, DaemonCase
 
 
 def call(channel, method, message):
@@ -26,8 +26,23 @@ class Wire(DaemonCase):
         method = self.channel.stream_stream("/grpc.reflection.v1alpha.ServerReflection/ServerReflectionInfo",
                                             lambda data: data, lambda data: data)
         answer = next(method(iter([list_services]), timeout=10))
-        for service in ("Models", "Datasets", "Jobs", "Shapes"):
+        for service in ("Models", "Datasets", "Jobs", "Shapes", "Server"):
             self.assertIn(b"shaped.v1." + service.encode(), answer)
+
+    def test_limits_are_told(self):
+        answer = call(self.channel, "/shaped.v1.Server/GetLimits", b"")
+        self.assertIn(b"shaped 0.", answer)
+        self.assertIn(b"\x08\x80\x89\x7a", answer)  # Limits {vertices: 2,000,000}
+
+    def test_errors_carry_details(self):
+        with self.assertRaises(grpc.RpcError) as raised:
+            call(self.channel, "/shaped.v1.Models/Get", b"\x0a\x05\x0a\x03cat")
+        self.assertEqual(raised.exception.code(), grpc.StatusCode.NOT_FOUND)
+        details = dict(raised.exception.trailing_metadata())["grpc-status-details-bin"]
+        self.assertIn(b"type.googleapis.com/google.rpc.ErrorInfo", details)
+        self.assertIn(b"MODEL_NOT_FOUND", details)
+        error = self.expect(NOT_FOUND, "describe", "cat").json["error"]
+        self.assertEqual((error["kind"], error["reason"]), ("not_found", "MODEL_NOT_FOUND"))
 
     def test_garbage_is_refused(self):
         with self.assertRaises(grpc.RpcError):

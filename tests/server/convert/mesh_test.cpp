@@ -13,7 +13,7 @@ TEST_CASE("a mesh survives the wire to float precision") {
   const auto sphere = test::icosphere(1);
   v1::Mesh wire;
   toProto(sphere.vertices, *sphere.topology, wire);
-  const auto back = meshFromProto(wire, "mesh");
+  const auto back = meshFromProto(wire, Limits(), "mesh");
   CHECK(back.topology->id() == sphere.topology->id());
   CHECK((back.vertices - sphere.vertices).cwiseAbs().maxCoeff() < 1e-7);
   CHECK((back.vertices - sphere.vertices).cwiseAbs().maxCoeff() > 0);
@@ -25,20 +25,40 @@ TEST_CASE("a faulty mesh is refused with the field's path") {
   toProto(sphere.vertices, *sphere.topology, good);
   auto mesh = good;
   mesh.add_positions(1);
-  CHECK_THROWS_WITH(meshFromProto(mesh, "from"), Contains("from.positions: has 37 numbers"));
+  CHECK_THROWS_WITH(meshFromProto(mesh, Limits(), "from"), Contains("from.positions: has 37 numbers"));
   mesh = good;
   mesh.set_positions(4, std::numeric_limits<float>::quiet_NaN());
-  CHECK_THROWS_WITH(meshFromProto(mesh, "from"), Contains("from: vertices: vertex 1 has a coordinate"));
+  CHECK_THROWS_WITH(meshFromProto(mesh, Limits(), "from"), Contains("from: vertices: vertex 1 has a coordinate"));
   mesh = good;
   mesh.add_faces(0);
-  CHECK_THROWS_WITH(meshFromProto(mesh, "from"), Contains("from.faces: has 61 indices"));
+  CHECK_THROWS_WITH(meshFromProto(mesh, Limits(), "from"), Contains("from.faces: has 61 indices"));
   mesh = good;
   mesh.set_faces(3, 4000000000U);
-  CHECK_THROWS_WITH(meshFromProto(mesh, "from"), Contains("from.faces[1]: vertex index 4000000000 is outside [0, 12)"));
+  CHECK_THROWS_WITH(meshFromProto(mesh, Limits(), "from"),
+                    Contains("from.faces[1]: vertex index 4000000000 is outside [0, 12)"));
   mesh = good;
   for (int corner = 0; corner < 3; ++corner) mesh.add_faces(good.faces(corner));
-  CHECK_THROWS_WITH(meshFromProto(mesh, "from"), Contains("from: faces: edge"));
-  CHECK_THROWS_WITH(meshFromProto(v1::Mesh(), "from"), Contains("from.faces: has 0 indices"));
+  CHECK_THROWS_WITH(meshFromProto(mesh, Limits(), "from"), Contains("from: faces: edge"));
+  CHECK_THROWS_WITH(meshFromProto(v1::Mesh(), Limits(), "from"), Contains("from.faces: has 0 indices"));
+}
+
+TEST_CASE("a mesh beyond the server's limits is refused before anything is built of it") {
+  const auto sphere = test::icosphere(0);
+  v1::Mesh mesh;
+  toProto(sphere.vertices, *sphere.topology, mesh);
+  Limits limits;
+  limits.vertices = 12;
+  limits.faces = 20;
+  CHECK_NOTHROW(meshFromProto(mesh, limits, "from"));
+  limits.vertices = 11;
+  CHECK_THROWS_WITH(meshFromProto(mesh, limits, "from"),
+                    Contains("from.faces: has 12 vertices to refer to, want at most 11"));
+  limits.vertices = 12;
+  limits.faces = 19;
+  CHECK_THROWS_WITH(meshFromProto(mesh, limits, "from"), Contains("from.faces: has 20 faces, want at most 19"));
+  // 3 x 2^31 vertices would wrap around in 32 bits, and a tiny message must not make the server allocate for them.
+  CHECK_THROWS_WITH(facesFromProto(mesh.faces(), std::int64_t{1} << 31, Limits(), "header.faces"),
+                    Contains("header.faces: has 2147483648 vertices to refer to"));
 }
 
 TEST_CASE("a shape must fit the model's topology") {

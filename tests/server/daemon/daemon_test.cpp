@@ -236,7 +236,7 @@ TEST_CASE("the server's own cap ends a call without a deadline, also while it wa
 
 TEST_CASE("a full queue refuses with a delay, and lists still answer") {
   auto options = oneThread();
-  options.limits.queue_length = 1;
+  options.admission.queue_length = 1;
   const test::TestDaemon daemon(options);
   const auto slow = pathRequest(24, 10000);
   std::vector<std::unique_ptr<grpc::ClientContext>> contexts;

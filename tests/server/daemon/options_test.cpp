@@ -31,7 +31,7 @@ TEST_CASE("the daemon's options are read") {
   CHECK(options.listen == "[::1]:7");
   CHECK(options.store == "dir");
   CHECK(options.threads == 3);
-  CHECK(options.limits.queue_bytes == 2 << 20);
+  CHECK(options.admission.queue_bytes == 2 << 20);
   CHECK(parse({"--store", "dir"}).threads == 8);
 }
 

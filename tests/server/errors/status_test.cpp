@@ -6,6 +6,8 @@
 
 #include "core/io/file_error.h"
 #include "core/numerics/error.h"
+#include "google/rpc/error_details.pb.h"
+#include "google/rpc/status.pb.h"
 #include "server/errors/errors.h"
 
 using namespace shaped;
@@ -16,6 +18,28 @@ namespace {
 template <class Error>
 grpc::Status statusFor(const Error& error, StopReason reason = StopReason::kNone) {
   return statusOf(std::make_exception_ptr(error), reason);
+}
+
+/// What a client unpacks.
+struct Details {
+  google::rpc::ErrorInfo info;
+  google::rpc::BadRequest request;
+  google::rpc::RetryInfo retry;
+  bool has_retry = false;
+};
+
+Details detailsOf(const grpc::Status& status) {
+  google::rpc::Status message;
+  REQUIRE(message.ParseFromString(status.error_details()));
+  CHECK(message.code() == status.error_code());
+  CHECK(message.message() == status.error_message());
+  Details details;
+  for (const auto& detail : message.details()) {
+    detail.UnpackTo(&details.info);
+    detail.UnpackTo(&details.request);
+    details.has_retry |= detail.UnpackTo(&details.retry);
+  }
+  return details;
 }
 
 }  // namespace
@@ -45,6 +69,31 @@ TEST_CASE("a stop says who did it") {
   CHECK(statusFor(Stopped(), StopReason::kDeadline).error_code() == grpc::DEADLINE_EXCEEDED);
 }
 
-TEST_CASE("a status fits gRPC's header limit") {
-  CHECK(statusFor(InvalidInput("label", std::string(100000, 'x'))).error_message().size() < 4096);
+TEST_CASE("a status carries its details for programs") {
+  const auto details = detailsOf(statusFor(InvalidInput("faces[3]", "is bad")));
+  CHECK(details.info.reason() == "INVALID_FIELD");
+  CHECK(details.info.domain() == "shaped");
+  REQUIRE(details.request.field_violations_size() == 1);
+  CHECK(details.request.field_violations(0).field() == "faces[3]");
+  CHECK(details.request.field_violations(0).description() == "faces[3]: is bad");
+  CHECK_FALSE(details.has_retry);
+
+  const auto busy = detailsOf(statusOf(
+      ErrorReport{grpc::RESOURCE_EXHAUSTED, "busy", Reason::kServerBusy, {}, std::chrono::milliseconds(2250)}));
+  CHECK(busy.info.reason() == "SERVER_BUSY");
+  REQUIRE(busy.has_retry);
+  CHECK(busy.retry.retry_delay().seconds() == 2);
+  CHECK(busy.retry.retry_delay().nanos() == 250'000'000);
+  CHECK(busy.request.field_violations_size() == 0);
+}
+
+TEST_CASE("a status fits gRPC's header limit, whatever a client wrote") {
+  for (const std::string letter : {"x", "\xC3\xA9", "\xE2\x82\xAC", "\xFF"}) {
+    std::string text;
+    for (int i = 0; i < 50000; ++i) text += letter;
+    const auto status = statusFor(InvalidInput(text, text));
+    // every byte of the message may be percent-encoded, the details are in base64
+    CHECK(3 * status.error_message().size() + 4 * status.error_details().size() / 3 < 7500);
+    CHECK(detailsOf(status).info.reason() == "INVALID_FIELD");
+  }
 }

@@ -1,0 +1,45 @@
+#pragma once
+
+#include <grpcpp/support/status.h>
+
+#include <chrono>
+#include <optional>
+#include <string>
+
+namespace shaped::server {
+
+/// Why a request was not served, for programs: the `reason` of google.rpc.ErrorInfo. Part of the API (docs/api.md):
+/// names never change.
+enum class Reason {
+  kInvalidField,      ///< the request itself is wrong; google.rpc.BadRequest names the field
+  kModelNotFound,     ///< no such model or version
+  kNotFound,          ///< no such dataset or job
+  kAlreadyExists,     ///< the name holds something else
+  kWrongState,        ///< not possible as things stand, whatever the request says
+  kServerBusy,        ///< refused at the door; google.rpc.RetryInfo says when to come back
+  kTooManyJobs,       ///< too many jobs wait
+  kDiskFull,          ///< no room in the store
+  kOutOfMemory,       ///< no memory for this request
+  kDataDamaged,       ///< a file of the store does not hold what was written to it
+  kFileFailure,       ///< the store cannot be read or written
+  kDeadlineExceeded,  ///< the client's deadline or the server's cap passed
+  kCancelled,         ///< the client cancelled or went away
+  kInternal,          ///< a defect of the server
+};
+/// "INVALID_FIELD" and so on.
+std::string nameOf(Reason reason);
+
+/// Everything that is told of a failure.
+struct ErrorReport {
+  grpc::StatusCode code = grpc::INTERNAL;
+  std::string message;
+  Reason reason = Reason::kInternal;
+  std::string field;  ///< path in the request; empty where no field is at fault
+  std::optional<std::chrono::milliseconds> retry_after;
+};
+
+/// The status as it goes over the wire: code and message, and as details a google.rpc.Status with ErrorInfo, and
+/// BadRequest and RetryInfo where they apply. Texts are cut so that it fits gRPC's header limit of 8 KiB.
+grpc::Status statusOf(const ErrorReport& report);
+
+}  // namespace shaped::server
