@@ -8,6 +8,29 @@ std::string pathEnergyText(v1::PathEnergy energy) {
   return energy == v1::PATH_ENERGY_DIRECTED ? "directed" : "symmetric";
 }
 
+std::string nameOf(v1::ModelState state) {
+  switch (state) {
+    case v1::MODEL_STATE_STORED:
+      return "stored";
+    case v1::MODEL_STATE_LOADING:
+      return "loading";
+    case v1::MODEL_STATE_READY:
+      return "ready";
+    case v1::MODEL_STATE_FAILED:
+      return "failed";
+    default:
+      return "unknown";
+  }
+}
+
+std::string stateText(const v1::ModelDescription& description) {
+  auto text = nameOf(description.state());
+  if (description.memory_bytes() > 0) text += " " + std::to_string((description.memory_bytes() >> 20) + 1) + " MiB";
+  if (description.serving()) text += " serving";
+  for (const auto& label : description.labels()) text += " " + label;
+  return text;
+}
+
 nlohmann::json toJson(const v1::ModelDescription& description) {
   nlohmann::json document{{"kind", description.kind()},
                           {"topology_id", description.topology_id()},
@@ -15,6 +38,10 @@ nlohmann::json toJson(const v1::ModelDescription& description) {
                           {"faces", description.face_count()},
                           {"created", timeText(description.created())},
                           {"dataset", description.dataset()}};
+  document["state"] = nameOf(description.state());
+  document["memory_bytes"] = description.memory_bytes();
+  document["labels"] = description.labels();
+  document["serving"] = description.serving();
   addModel(document, description.model());
   addReport(document["training"], description.training());
   const auto& pga = description.shell_pga();

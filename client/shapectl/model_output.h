@@ -10,6 +10,12 @@ namespace shaped::shapectl {
 /// "symmetric" or "directed".
 std::string pathEnergyText(v1::PathEnergy energy);
 
+/// "ready", "stored" and so on.
+std::string nameOf(v1::ModelState state);
+
+/// State, memory and labels for people: "ready 12 MiB serving stable".
+std::string stateText(const v1::ModelDescription& description);
+
 nlohmann::json toJson(const v1::ModelDescription& description);
 
 }  // namespace shaped::shapectl

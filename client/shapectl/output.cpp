@@ -61,9 +61,10 @@ v1::ModelSelector parseModel(const std::string& text) {
   std::uint64_t version = 0;
   const auto* end = text.data() + text.size();
   const auto [stopped, error] = std::from_chars(text.data() + at + 1, end, version);
-  if (error != std::errc() || stopped != end || version == 0)
-    throw InvalidInput(text, "a model is NAME or NAME@VERSION, with a version of 1 or more");
-  selector.set_version(version);
+  const bool number = error == std::errc() && stopped == end;
+  if (at + 1 == text.size() || (number && version == 0))
+    throw InvalidInput(text, "a model is NAME, NAME@VERSION with a version of 1 or more, or NAME@LABEL");
+  number ? selector.set_version(version) : selector.set_label(text.substr(at + 1));
   return selector;
 }
 

@@ -31,7 +31,7 @@ std::string reportText(const v1::SolverReport& report);
 /// Success when the solver converged, kNotConverged otherwise.
 ExitCode exitCodeOf(const v1::SolverReport& report);
 
-/// NAME or NAME@VERSION from the command line. Throws InvalidInput when the version is no positive number.
+/// NAME, NAME@VERSION or NAME@LABEL from the command line. Throws InvalidInput when nothing or 0 follows the @.
 v1::ModelSelector parseModel(const std::string& text);
 
 }  // namespace shaped::shapectl

@@ -1,5 +1,6 @@
 #include "core/io/model_directory.h"
 
+#include <sys/stat.h>
 #include <unistd.h>
 
 #include <algorithm>
@@ -21,14 +22,17 @@ constexpr const char* kTensors = "tensors.safetensors";
 constexpr std::int64_t kMostVersions = 1'000'000'000'000;
 constexpr const char* kHighestVersion = ".highest-version";  ///< ever given; only written when that version is removed
 
-void requireName(const std::string& model) {
+constexpr const char* kLabels = "labels.json";
+
+void requireName(const std::string& model, const char* field = "model") {
   const auto allowed = [](char c) {
     return (c >= 'A' && c <= 'Z') || (c >= 'a' && c <= 'z') || (c >= '0' && c <= '9') || c == '.' || c == '_' ||
            c == '-';
   };
   if (model.empty() || model.size() > 100 || model.front() == '.' || !std::all_of(model.begin(), model.end(), allowed))
     throw InvalidInput(
-        "model", quotedWord(model) + " is no name for a model; want 1 to 100 of A-Z a-z 0-9 . _ -, the first no dot");
+        field,
+        quotedWord(model) + " is no name for a model or label; want 1 to 100 of A-Z a-z 0-9 . _ -, the first no dot");
 }
 
 /// The number of a version's folder; 0 for any other entry.
@@ -213,6 +217,43 @@ std::vector<std::string> ModelDirectory::models() const {
 
 std::vector<std::int64_t> ModelDirectory::versions(const std::string& model) const {
   return versionsIn(folderOf(model));
+}
+
+std::string ModelDirectory::fingerprint(const std::string& model, std::int64_t version) const {
+  std::string print;
+  for (const auto* name : {kManifest, kTensors}) {
+    struct stat status {};
+    if (::stat((folderOf(model) / std::to_string(version) / name).c_str(), &status) != 0) continue;
+    for (const auto number : {static_cast<std::int64_t>(status.st_ino), static_cast<std::int64_t>(status.st_size),
+                              static_cast<std::int64_t>(status.st_mtim.tv_sec), status.st_mtim.tv_nsec})
+      print += std::to_string(number) + " ";
+  }
+  return print;
+}
+
+std::map<std::string, std::int64_t> ModelDirectory::labels(const std::string& model) const {
+  const auto path = folderOf(model) / kLabels;
+  std::error_code none;
+  if (!fs::exists(path, none)) return {};
+  try {
+    return json::parse(readFile(path)).get<std::map<std::string, std::int64_t>>();
+  } catch (const json::exception& problem) {
+    throw FileError(path.string(), std::string("is no list of labels: ") + problem.what());
+  }
+}
+
+void ModelDirectory::setLabel(const std::string& model, const std::string& label, std::int64_t version) const {
+  requireName(label, "label");
+  std::optional<std::int64_t> wanted;
+  if (version != 0) wanted = version;
+  folderOf(model, wanted);  // throws when there is no such model or version
+  const FolderLock lock(folderOf(model));
+  auto all = labels(model);
+  if (version == 0)
+    all.erase(label);
+  else
+    all[label] = version;
+  writeFile(folderOf(model) / kLabels, json(all).dump(2) + "\n");
 }
 
 void ModelDirectory::remove(const std::string& model, std::int64_t version) const {

@@ -2,6 +2,7 @@
 
 #include <cstdint>
 #include <filesystem>
+#include <map>
 #include <memory>
 #include <nlohmann/json.hpp>
 #include <optional>
@@ -62,6 +63,16 @@ class ModelDirectory {
   std::vector<std::string> models() const;
   /// Versions in rising order; empty when there is no such model.
   std::vector<std::int64_t> versions(const std::string& model) const;
+
+  /// Tells one state of a version's files from another without reading them; empty when they are not there.
+  std::string fingerprint(const std::string& model, std::int64_t version) const;
+
+  /// The labels of a model and the versions they stand for. A version may have gone since. Throws FileError when their
+  /// file is damaged.
+  std::map<std::string, std::int64_t> labels(const std::string& model) const;
+  /// Lets a label, a name like a model's, stand for a version, or for none (0). Throws ModelNotFound, InvalidInput,
+  /// FileError.
+  void setLabel(const std::string& model, const std::string& label, std::int64_t version) const;
 
   /// Removes one version, or the model with all of them. Throws ModelNotFound, or FileError when removing fails.
   void remove(const std::string& model, std::int64_t version) const;

@@ -105,6 +105,19 @@ std::vector<MarkerSite> ShellPgaModel::sitesOf(const MarkerSet& markers) const {
   return sites;
 }
 
+std::size_t ShellPgaModel::memoryBytes() const {
+  // Measured on bodies of 1,250 to 13,380 vertices: connectivity with its edges and hinges, prolongation and placements
+  // of a fine vertex; pattern, slots and symbolic factorisation of a coarse one.
+  constexpr std::size_t fine_vertex = 700, coarse_vertex = 16'000;
+  const auto count = [](Eigen::Index numbers) { return static_cast<std::size_t>(numbers) * sizeof(double); };
+  const auto coarse_vertices = static_cast<std::size_t>(parts_.coarsening.coarse->vertexCount());
+  std::size_t bytes =
+      static_cast<std::size_t>(topology().vertexCount()) * fine_vertex + coarse_vertices * coarse_vertex;
+  for (const auto& variation : pga().variations) bytes += count(variation.size());
+  bytes += static_cast<std::size_t>(parts_.detail.nonZeros()) * (sizeof(double) + sizeof(int));
+  return bytes + count(pga().eigenvectors.size());
+}
+
 const ShellStructurePtr& ShellPgaModel::fineStructure() const {
   std::call_once(fine_structure_once_, [this] { fine_structure_ = std::make_shared<ShellStructure>(parts_.topology); });
   return fine_structure_;

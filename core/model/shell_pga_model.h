@@ -61,6 +61,9 @@ class ShellPgaModel {
   /// Where the markers sit on the coarse mesh. Throws InvalidInput naming markers[i].
   std::vector<MarkerSite> sitesOf(const MarkerSet& markers) const;
 
+  /// Memory that the model takes, about [bytes]: its tensors, and what solvers keep of it.
+  std::size_t memoryBytes() const;
+
   /// Sparsity and symbolic factorisation at full resolution, made at the first call.
   const ShellStructurePtr& fineStructure() const;
   /// The submanifold of the prolongated mean and variations at full resolution, made at the first call.

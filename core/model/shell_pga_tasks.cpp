@@ -68,6 +68,12 @@ constexpr double kLeastVariance = 1e-6;
 
 }  // namespace
 
+void warm(const ShellPgaModel& model) {
+  SubmanifoldPoint point;
+  point.alpha = Eigen::VectorXd::Unit(2 * model.modes(), 0);
+  synthesize(model, point, {});
+}
+
 ShellPgaScore scoreOf(const ShellPgaModel& model, const Eigen::VectorXd& tangent_coordinates) {
   constexpr double log_two_pi = 1.8378770664093453;
   const auto count = tangent_coordinates.size();

@@ -48,6 +48,9 @@ struct SynthesisOptions {
 Solved<SynthesizedShape> synthesize(const ShellPgaModel& model, const SubmanifoldPoint& coefficients,
                                     const SynthesisOptions& options);
 
+/// Computes one shape, so that the first request does not wait for memory and caches.
+void warm(const ShellPgaModel& model);
+
 /// The Gaussian score of tangent coordinates (J entries, J at most the model's) without the residual.
 ShellPgaScore scoreOf(const ShellPgaModel& model, const Eigen::VectorXd& tangent_coordinates);
 

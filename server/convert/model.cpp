@@ -9,6 +9,20 @@ namespace {
 
 v1::PathEnergy pathEnergyOf(bool symmetric) { return symmetric ? v1::PATH_ENERGY_SYMMETRIC : v1::PATH_ENERGY_DIRECTED; }
 
+v1::ModelState stateOf(ModelState state) {
+  switch (state) {
+    case ModelState::kStored:
+      return v1::MODEL_STATE_STORED;
+    case ModelState::kLoading:
+      return v1::MODEL_STATE_LOADING;
+    case ModelState::kReady:
+      return v1::MODEL_STATE_READY;
+    case ModelState::kFailed:
+      return v1::MODEL_STATE_FAILED;
+  }
+  return v1::MODEL_STATE_UNSPECIFIED;
+}
+
 void setIdentity(const std::string& name, std::uint64_t version, const ModelManifest& manifest,
                  v1::ModelDescription& description) {
   description.mutable_model()->set_name(name);
@@ -20,6 +34,15 @@ void setIdentity(const std::string& name, std::uint64_t version, const ModelMani
 }
 
 }  // namespace
+
+ModelSelector selectorFromProto(const v1::ModelSelector& message) {
+  return {message.name(), message.version(), message.label()};
+}
+
+void toProto(const ModelStore::Standing& standing, v1::ModelDescription& description) {
+  description.mutable_labels()->Add(standing.labels.begin(), standing.labels.end());
+  description.set_serving(standing.serving);
+}
 
 void toProto(const ModelStore::Entry& entry, v1::ModelDescription& description) {
   setIdentity(entry.name, entry.version, entry.manifest, description);
@@ -34,6 +57,9 @@ void toProto(const ModelStore::Entry& entry, v1::ModelDescription& description) 
   pga.set_coarse_vertices(json.value("coarse_vertices", 0U));
   pga.set_bending(json.value("bending", 0.0));
   pga.set_path_energy(pathEnergyOf(json.value("path_energy", "") == "symmetric"));
+  description.set_state(stateOf(entry.state));
+  description.set_memory_bytes(entry.bytes);
+  toProto(entry.standing, description);
 }
 
 void toProto(const ServedModel& model, v1::ModelDescription& description) {
@@ -51,6 +77,8 @@ void toProto(const ServedModel& model, v1::ModelDescription& description) {
   pga.set_bending(parts.bending);
   pga.set_path_energy(pathEnergyOf(parts.symmetry == EnergySymmetry::kSymmetric));
   for (const double value : parts.pga.eigenvalues) pga.add_eigenvalues(value);
+  description.set_state(v1::MODEL_STATE_READY);
+  description.set_memory_bytes(model.bytes);
 }
 
 SubmanifoldPoint coefficientsFromProto(const v1::Coefficients& coefficients, const Limits& limits) {

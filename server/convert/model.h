@@ -9,8 +9,11 @@ namespace shaped::server {
 
 /// What the manifest says; eigenvalues are not in it.
 void toProto(const ModelStore::Entry& entry, v1::ModelDescription& description);
-/// Everything.
+void toProto(const ModelStore::Standing& standing, v1::ModelDescription& description);
+/// Everything but what stands for it.
 void toProto(const ServedModel& model, v1::ModelDescription& description);
+
+ModelSelector selectorFromProto(const v1::ModelSelector& message);
 
 /// The weights as they came; whether they are a point of a model is for the model to say. Throws InvalidInput when they
 /// are more than the limits allow.

@@ -25,7 +25,7 @@ void alone(const std::function<void()>& serve) { runInArena(1, serve); }
 Daemon::Daemon(const DaemonOptions& options)
     : options_(options),
       lock_(options.store),
-      models_(options.store / "models"),
+      models_(options.store / "models", options.models),
       datasets_(options.store / "datasets"),
       pool_(options.threads, options.admission, alone),
       light_(kLightThreads, options.admission, alone),

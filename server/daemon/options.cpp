@@ -107,6 +107,9 @@ std::vector<OptionSpec> makeSpecs() {
           "open-streams", "N", When::kWhileRunning, kMostCount,
           [](auto& o) -> auto& { return o.admission.open_streams; }, "streams at a time"),
       countOption(
+          "model-megabytes", "N", When::kAtStart, kMostCount, [](auto& o) -> auto& { return o.models.memory_budget; },
+          "memory for models; those that no request holds are dropped at need [MiB]", 1 << 20),
+      countOption(
           "max-vertices", "N", When::kAtStart, kMostVertices, [](auto& o) -> auto& { return o.limits.vertices; },
           "largest mesh that is taken"),
       countOption(

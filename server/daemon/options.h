@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "server/convert/limits.h"
+#include "server/models/model_store.h"
 #include "server/scheduling/admission.h"
 
 namespace shaped::server {
@@ -19,7 +20,8 @@ struct DaemonOptions {
   double drain = 0;                        ///< asked to stop: how long it still answers, NOT_SERVING [s], >= 0
   double grace = 5;                        ///< then: how long running calls may go on [s], >= 0
   AdmissionLimits admission;
-  Limits limits;             ///< of requests
+  Limits limits;  ///< of requests
+  ModelStoreOptions models;
   std::string log = "info";  ///< debug, info, warn, error
 };
 

@@ -22,6 +22,22 @@ class Busy : public std::runtime_error {
   using std::runtime_error::runtime_error;
 };
 
+/// Not possible as things stand, whatever the request says.
+class WrongState : public std::runtime_error {
+  using std::runtime_error::runtime_error;
+};
+
+/// A model does not fit into the memory budget.
+class OverBudget : public std::runtime_error {
+ public:
+  /// may_pass: whether it would fit once requests have let go of others.
+  OverBudget(const std::string& text, bool may_pass) : std::runtime_error(text), may_pass_(may_pass) {}
+  bool mayPass() const { return may_pass_; }
+
+ private:
+  bool may_pass_;
+};
+
 /// A file of the store does not hold what was written to it.
 class Corrupted : public std::runtime_error {
   using std::runtime_error::runtime_error;

@@ -42,6 +42,12 @@ ErrorReport reportOf(const std::exception_ptr& error, StopReason stopped) {
     return {grpc::ALREADY_EXISTS, problem.what(), Reason::kAlreadyExists, {}, {}};
   } catch (const Busy& problem) {
     return {grpc::RESOURCE_EXHAUSTED, problem.what(), Reason::kTooManyJobs, {}, kBusyDelay};
+  } catch (const WrongState& problem) {
+    return {grpc::FAILED_PRECONDITION, problem.what(), Reason::kWrongState, {}, {}};
+  } catch (const OverBudget& problem) {
+    ErrorReport report{grpc::RESOURCE_EXHAUSTED, problem.what(), Reason::kMemoryBudget, {}, {}};
+    if (problem.mayPass()) report.retry_after = std::chrono::seconds(1);
+    return report;
   } catch (const Corrupted& problem) {
     return {grpc::DATA_LOSS, problem.what(), Reason::kDataDamaged, {}, {}};
   } catch (const FileError& problem) {

@@ -14,7 +14,8 @@ namespace shaped::server {
 ///   ModelNotFound, NotFound -> NOT_FOUND
 ///   any other InvalidInput -> INVALID_ARGUMENT; text and details name the field
 ///   AlreadyExists -> ALREADY_EXISTS
-///   Busy, std::bad_alloc -> RESOURCE_EXHAUSTED
+///   WrongState -> FAILED_PRECONDITION
+///   Busy, OverBudget, std::bad_alloc -> RESOURCE_EXHAUSTED
 ///   Corrupted -> DATA_LOSS
 ///   Stopped -> see stoppedStatus
 ///   FileError, std::system_error -> RESOURCE_EXHAUSTED when the disk is full, else INTERNAL

@@ -1,79 +1,123 @@
 #pragma once
 
 #include <chrono>
-#include <filesystem>
-#include <list>
 #include <map>
-#include <memory>
 #include <mutex>
-#include <optional>
 #include <string>
 #include <vector>
 
-#include "core/io/model_directory.h"
-#include "core/model/shell_pga_model.h"
+#include "server/models/pending_model.h"
+#include "server/scheduling/worker_pool.h"
 
 namespace shaped::server {
 
-/// A model in memory: one version, immutable. Whoever holds the pointer keeps it, whatever happens to the store.
-struct ServedModel {
-  std::string name;
-  std::uint64_t version = 0;
-  ModelManifest manifest;
-  ShellPgaModelPtr shell_pga;
+enum class ModelState {
+  kStored,   ///< on the disk; loaded when a request wants it
+  kLoading,  ///< on its way into memory
+  kReady,    ///< in memory
+  kFailed,   ///< its last load failed; the next tries again once its files have changed, or on load()
 };
-using ServedModelPtr = std::shared_ptr<const ServedModel>;
 
-/// Where a model came from; kept in its manifest.
-struct Provenance {
-  std::string dataset;
-  std::chrono::system_clock::time_point created;
+struct ModelStoreOptions {
+  std::size_t memory_budget = std::size_t{4} << 30;  ///< of models in memory [bytes]
+  int loaders = 2;                                   ///< threads that load, so that one bad model delays no other, >= 1
 };
-Provenance provenanceOf(const ModelManifest& manifest);
 
-/// The models under <root>/<name>/<version>/. Loads a version when it is first asked for, and keeps the ones used last
-/// in memory. Safe from any thread.
+/// The models under <root>/<name>/<version>/, and those of them that are in memory. Safe from any thread.
+///
+/// A version comes into memory when it is published, asked for by load(), or wanted by a request: its files are
+/// verified, the model is built and warmed, and only then does it replace the one before; who holds that one keeps it.
+/// Models that no request holds are dropped, the least recently used first, when the memory budget would be exceeded.
+///
+/// Without a version or label a name stands for its "stable" version, where that label is set, else for the newest
+/// version known: at start the newest on the disk, then what was published or loaded here. What another process puts
+/// into the store counts once it is loaded.
 class ModelStore {
  public:
-  /// most_loaded: models that are kept in memory although no request uses them, >= 1.
-  explicit ModelStore(const std::filesystem::path& root, std::size_t most_loaded = 16);
+  explicit ModelStore(const std::filesystem::path& root, const ModelStoreOptions& options = {});
 
-  /// The newest version of a name (0), or a given one. Loads it at need; others that want the same wait for that load.
-  /// Throws ModelNotFound, InvalidInput for a bad name, FileError when its files are damaged.
-  ServedModelPtr pin(const std::string& name, std::uint64_t version);
+  /// The model, held as long as the pointer lives. When it is not in memory, starts to load it and throws Waiting.
+  /// Throws ModelNotFound; InvalidInput for a bad name or a selector with version and label; what its load threw:
+  /// FileError when files are damaged, at once until they change, OverBudget when it does not fit into memory.
+  ServedModelPtr pin(const ModelSelector& selector);
+  /// Starts to load a version from the disk, whether or not it is in memory; 0: the newest on the disk. Its name stands
+  /// for it afterwards unless it stood for a newer one. Throws ModelNotFound, InvalidInput for a bad name.
+  PendingModelPtr load(const std::string& name, std::uint64_t version);
+  /// Drops a version from memory, or all of a name (0); returns those dropped. Requests that hold it finish.
+  /// Throws ModelNotFound.
+  std::vector<std::uint64_t> unload(const std::string& name, std::uint64_t version);
+  /// The model once it is in memory, without loading it. Throws Waiting until then; InvalidInput as pin().
+  ServedModelPtr ready(const ModelSelector& selector);
+
+  /// What stands for a version.
+  struct Standing {
+    std::vector<std::string> labels;
+    bool serving = false;  ///< whether its name alone does
+  };
+  Standing standing(const std::string& name, std::uint64_t version) const;
 
   /// A version without its tensors.
   struct Entry {
     std::string name;
-    std::uint64_t version;
+    std::uint64_t version = 0;
     ModelManifest manifest;
+    ModelState state = ModelState::kStored;
+    std::size_t bytes = 0;  ///< in memory; 0: not there
+    Standing standing;
   };
   /// All versions by name and number, without loading any. A version whose manifest is damaged is left out.
   std::vector<Entry> list() const;
+  /// The models in memory, by name and version.
+  std::vector<ServedModelPtr> loaded() const;
 
-  /// Writes a new version; the model is then in memory. Throws FileError when the disk fails: nothing is left behind.
+  /// Writes a new version, for which its name stands afterwards; it is in memory if the budget allows. Throws FileError
+  /// when the disk fails: nothing is left behind.
   ServedModelPtr publish(const std::string& name, ShellPgaModelPtr model, const Provenance& provenance);
-
-  /// Removes one version, or all (0); returns the versions removed. Throws ModelNotFound; FileError when the disk
-  /// fails.
+  /// Removes one version, or all (0); returns the versions removed. Throws ModelNotFound; WrongState when a label
+  /// stands for the one version; FileError when the disk fails.
   std::vector<std::uint64_t> remove(const std::string& name, std::uint64_t version);
+  /// Lets a label stand for a version, or for none (0); on the disk when it returns. Throws ModelNotFound, InvalidInput
+  /// for a bad label, FileError.
+  void setLabel(const std::string& name, const std::string& label, std::uint64_t version);
 
  private:
   using Key = std::pair<std::string, std::uint64_t>;
-  /// Loads at most once, whoever comes first; a failed load is tried again by the next.
-  struct Slot {
-    std::mutex loading;
-    ServedModelPtr model;
+  /// How the last load ended, when it failed: who asks again before the files change or the time is up fails alike.
+  struct Failure {
+    PendingModelPtr load;
+    std::string files;  ///< their fingerprint
+    std::chrono::steady_clock::time_point until;
   };
+  struct Slot {
+    ServedModelPtr model;     ///< once ready
+    PendingModelPtr pending;  ///< while it loads
+    Failure failure;
+    std::uint64_t last_used = 0;
+  };
+  using Labels = std::map<std::string, std::uint64_t>;
 
-  std::uint64_t resolve(const std::string& name, std::uint64_t version) const;
-  std::shared_ptr<Slot> slotOf(const Key& key);
+  std::uint64_t servingVersion(const std::string& name) const;
+  std::vector<std::string> labelsOf(const Key& key) const;
+  Key resolve(const ModelSelector& selector) const;
+  Key requireStored(Key key) const;
+  PendingModelPtr startLoad(const Key& key);
+  void runLoad(const Key& key, const PendingModelPtr& pending);
+  ServedModelPtr read(const Key& key);
+  void swapIn(const Key& key, const ServedModelPtr& model);
+  void settle(const Key& key, Failure failure);
+  void keep(const Key& key, ServedModelPtr model);
+  void makeRoom(const Key& wanted, std::size_t bytes);
+  void changed();
 
   const ModelDirectory directory_;
-  const std::size_t most_loaded_;
-  std::mutex mutex_;
-  std::map<Key, std::shared_ptr<Slot>> slots_;
-  std::list<Key> used_;  // the latest first; the keys of slots_
+  const ModelStoreOptions options_;
+  mutable std::mutex mutex_;
+  std::map<Key, Slot> slots_;
+  std::map<std::string, std::uint64_t> newest_;  ///< by name: the newest version known
+  std::map<std::string, Labels> labels_;
+  std::vector<Waiting::Resume> watchers_;  ///< of ready()
+  std::uint64_t uses_ = 0, loads_ = 0, changes_ = 0;
+  WorkerPool loaders_;  // last: its threads use what stands above
 };
 
 }  // namespace shaped::server

@@ -1,5 +1,6 @@
 #pragma once
 
+#include "server/convert/model.h"
 #include "server/convert/report.h"
 #include "server/errors/errors.h"
 #include "server/models/model_store.h"
@@ -7,10 +8,11 @@
 
 namespace shaped::server {
 
-/// Pins the model that a request names and notes it for the log.
+/// Pins the model that a request names and notes it for the log. Throws Waiting while it is being loaded, so call it
+/// before anything else.
 template <class Request>
 ServedModelPtr pinModel(ModelStore& store, const Request& request, Call& call) {
-  auto model = store.pin(request.model().name(), request.model().version());
+  auto model = store.pin(selectorFromProto(request.model()));
   call.setModel(model->name, model->version);
   return model;
 }

@@ -3,6 +3,7 @@
 #include <algorithm>
 
 #include "server/errors/errors.h"
+#include "server/scheduling/waiting.h"
 #include "server/telemetry/call_log.h"
 
 namespace shaped::server {
@@ -44,6 +45,8 @@ grpc::Status Call::guarded(const std::function<void()>& work) {
     throwIfStopped();
     work();
     return grpc::Status::OK;
+  } catch (const Waiting&) {
+    throw;
   } catch (...) {
     return statusOf(std::current_exception(), stopper_.reason());
   }

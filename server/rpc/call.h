@@ -48,7 +48,7 @@ class Call {
 
   // For the reactors.
 
-  /// Runs a piece of work and turns its exceptions into a status.
+  /// Runs a piece of work and turns its exceptions into a status, all but Waiting.
   grpc::Status guarded(const std::function<void()>& work);
   /// Fires the token. The client's own deadline is told from a cancellation by the clock.
   void stop(StopReason reason);

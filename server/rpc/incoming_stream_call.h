@@ -8,6 +8,7 @@
 #include <type_traits>
 
 #include "server/rpc/call.h"
+#include "server/scheduling/waiting.h"
 
 namespace shaped::server {
 
@@ -16,7 +17,8 @@ template <class Request, class Response>
 class StreamHandler {
  public:
   virtual ~StreamHandler() = default;
-  /// A message. True when `response` was filled and is to be sent (streams that answer every message).
+  /// A message; comes again after it threw Waiting. True when `response` was filled and is to be sent (streams that
+  /// answer every message).
   virtual bool message(const Request& request, Response& response, Call& call) = 0;
   /// The client has sent all; fills the one response of a stream that answers at the end.
   virtual void end(Response& response, Call& call) = 0;
@@ -50,7 +52,7 @@ class IncomingStreamCall final : public Reactor,
   }
 
  private:
-  enum class State { kReading, kWorking, kWriting, kEnded };
+  enum class State { kReading, kWorking, kParked, kWriting, kEnded };
   // Every function below holds mutex_. It is recursive because gRPC may run a reaction inside the call that causes it.
   using Lock = std::scoped_lock<std::recursive_mutex>;
 
@@ -77,17 +79,38 @@ class IncomingStreamCall final : public Reactor,
   void work(bool has_message) {
     bool answer = false;
     own_response_.Clear();
-    const auto status = call_.guarded([&] {
-      if (has_message)
-        answer = handler_->message(request_, response(), call_);
-      else
-        handler_->end(response(), call_);
-    });
+    grpc::Status status;
+    try {
+      status = call_.guarded([&] {
+        if (has_message)
+          answer = handler_->message(request_, response(), call_);
+        else
+          handler_->end(response(), call_);
+      });
+    } catch (const Waiting& waiting) {
+      return park(waiting);
+    }
     const Lock lock(mutex_);
     if (state_ == State::kEnded) return;
     if (!status.ok() || !has_message) return end(status);
     if (call_.stopped()) return end(call_.stopStatus());
     answer ? write() : read();
+  }
+
+  /// The message is handled again once what it waits for has come; only messages wait, never the end.
+  void park(const Waiting& waiting) {
+    const Lock lock(mutex_);
+    if (state_ == State::kEnded) return;
+    if (call_.stopped()) return end(call_.stopStatus());
+    state_ = State::kParked;
+    waiting.then([self = this->shared_from_this()] { self->resume(); });
+  }
+
+  void resume() {
+    const Lock lock(mutex_);
+    if (state_ != State::kParked) return;
+    state_ = State::kWorking;
+    pool_.submit(call_.id(), 0, Entry::kContinuation, [self = this->shared_from_this()] { self->work(true); });
   }
 
   void write() {
@@ -106,7 +129,7 @@ class IncomingStreamCall final : public Reactor,
     call_.stop(reason);
     const bool withdrawn = pool_.withdraw(call_.id());
     const Lock lock(mutex_);
-    if (withdrawn || state_ == State::kReading) return end(call_.stopStatus());
+    if (withdrawn || state_ == State::kReading || state_ == State::kParked) return end(call_.stopStatus());
     // A write that waits for a client who does not read would wait for ever. A worker sees the stop by itself.
     if (state_ == State::kWriting) context_.TryCancel();
   }

@@ -1,10 +1,24 @@
 #include "server/rpc/models_service.h"
 
+#include "core/numerics/error.h"
 #include "server/convert/mesh.h"
 #include "server/convert/model.h"
+#include "server/rpc/answer.h"
 #include "server/rpc/unary_call.h"
 
 namespace shaped::server {
+namespace {
+
+void requireNoLabel(const v1::ModelSelector& model) {
+  if (!model.label().empty()) throw InvalidInput("model.label", "has no meaning here; name a version, or 0");
+}
+
+void setVersion(const std::string& name, std::uint64_t version, v1::ModelVersion& message) {
+  message.set_name(name);
+  message.set_version(version);
+}
+
+}  // namespace
 
 grpc::ServerUnaryReactor* ModelsService::List(grpc::CallbackServerContext* context,
                                               const v1::ListModelsRequest* request, v1::ListModelsResponse* response) {
@@ -19,11 +33,56 @@ grpc::ServerUnaryReactor* ModelsService::Get(grpc::CallbackServerContext* contex
   return startUnary<v1::GetModelRequest, v1::GetModelResponse>(
       runtime_, runtime_.light, "Models.Get", context, request, response,
       [this](const auto& wanted, auto& answer, Call& call) {
-        const auto model = store_.pin(wanted.model().name(), wanted.model().version());
-        call.setModel(model->name, model->version);
+        const auto model = pinModel(store_, wanted, call);
         toProto(*model, *answer.mutable_description());
+        toProto(store_.standing(model->name, model->version), *answer.mutable_description());
         if (wanted.with_mean()) toProto(model->shell_pga->mean(), model->shell_pga->topology(), *answer.mutable_mean());
       });
+}
+
+grpc::ServerUnaryReactor* ModelsService::Load(grpc::CallbackServerContext* context, const v1::LoadModelRequest* request,
+                                              v1::LoadModelResponse* response) {
+  return startUnary<v1::LoadModelRequest, v1::LoadModelResponse>(
+      runtime_, runtime_.light, "Models.Load", context, request, response,
+      [this, pending = PendingModelPtr()](const auto& wanted, auto& answer, Call& call) mutable {
+        requireNoLabel(wanted.model());
+        if (!pending) pending = store_.load(wanted.model().name(), wanted.model().version());
+        const auto model = pending->get();
+        call.setModel(model->name, model->version);
+        toProto(*model, *answer.mutable_description());
+        toProto(store_.standing(model->name, model->version), *answer.mutable_description());
+      });
+}
+
+grpc::ServerUnaryReactor* ModelsService::Unload(grpc::CallbackServerContext* context,
+                                                const v1::UnloadModelRequest* request,
+                                                v1::UnloadModelResponse* response) {
+  return startUnary<v1::UnloadModelRequest, v1::UnloadModelResponse>(
+      runtime_, runtime_.light, "Models.Unload", context, request, response,
+      [this](const auto& wanted, auto& answer, Call&) {
+        requireNoLabel(wanted.model());
+        for (const auto version : store_.unload(wanted.model().name(), wanted.model().version()))
+          setVersion(wanted.model().name(), version, *answer.add_unloaded());
+      });
+}
+
+grpc::ServerUnaryReactor* ModelsService::WaitUntilReady(grpc::CallbackServerContext* context,
+                                                        const v1::WaitUntilReadyRequest* request,
+                                                        v1::WaitUntilReadyResponse* response) {
+  return startUnary<v1::WaitUntilReadyRequest, v1::WaitUntilReadyResponse>(
+      runtime_, runtime_.light, "Models.WaitUntilReady", context, request, response,
+      [this](const auto& wanted, auto& answer, Call& call) {
+        const auto model = store_.ready(selectorFromProto(wanted.model()));
+        call.setModel(model->name, model->version);
+        setVersion(model->name, model->version, *answer.mutable_model());
+      });
+}
+
+grpc::ServerUnaryReactor* ModelsService::SetLabel(grpc::CallbackServerContext* context,
+                                                  const v1::SetLabelRequest* request, v1::SetLabelResponse* response) {
+  return startUnary<v1::SetLabelRequest, v1::SetLabelResponse>(
+      runtime_, runtime_.light, "Models.SetLabel", context, request, response,
+      [this](const auto& wanted, auto&, Call&) { store_.setLabel(wanted.name(), wanted.label(), wanted.version()); });
 }
 
 grpc::ServerUnaryReactor* ModelsService::Delete(grpc::CallbackServerContext* context,
@@ -32,11 +91,9 @@ grpc::ServerUnaryReactor* ModelsService::Delete(grpc::CallbackServerContext* con
   return startUnary<v1::DeleteModelRequest, v1::DeleteModelResponse>(
       runtime_, runtime_.light, "Models.Delete", context, request, response,
       [this](const auto& wanted, auto& answer, Call&) {
-        for (const auto version : store_.remove(wanted.model().name(), wanted.model().version())) {
-          auto& deleted = *answer.add_deleted();
-          deleted.set_name(wanted.model().name());
-          deleted.set_version(version);
-        }
+        requireNoLabel(wanted.model());
+        for (const auto version : store_.remove(wanted.model().name(), wanted.model().version()))
+          setVersion(wanted.model().name(), version, *answer.add_deleted());
       });
 }
 

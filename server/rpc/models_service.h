@@ -14,6 +14,15 @@ class ModelsService final : public v1::Models::CallbackService {
                                  v1::ListModelsResponse* response) override;
   grpc::ServerUnaryReactor* Get(grpc::CallbackServerContext* context, const v1::GetModelRequest* request,
                                 v1::GetModelResponse* response) override;
+  grpc::ServerUnaryReactor* Load(grpc::CallbackServerContext* context, const v1::LoadModelRequest* request,
+                                 v1::LoadModelResponse* response) override;
+  grpc::ServerUnaryReactor* Unload(grpc::CallbackServerContext* context, const v1::UnloadModelRequest* request,
+                                   v1::UnloadModelResponse* response) override;
+  grpc::ServerUnaryReactor* WaitUntilReady(grpc::CallbackServerContext* context,
+                                           const v1::WaitUntilReadyRequest* request,
+                                           v1::WaitUntilReadyResponse* response) override;
+  grpc::ServerUnaryReactor* SetLabel(grpc::CallbackServerContext* context, const v1::SetLabelRequest* request,
+                                     v1::SetLabelResponse* response) override;
   grpc::ServerUnaryReactor* Delete(grpc::CallbackServerContext* context, const v1::DeleteModelRequest* request,
                                    v1::DeleteModelResponse* response) override;
 

@@ -8,6 +8,8 @@
 #include <mutex>
 
 #include "server/rpc/call.h"
+#include "server/rpc/parking.h"
+#include "server/scheduling/waiting.h"
 
 namespace shaped::server {
 
@@ -18,7 +20,8 @@ class ServerStreamCall final : public grpc::ServerWriteReactor<Response>,
                                public std::enable_shared_from_this<ServerStreamCall<Request, Response>> {
  public:
   using Write = std::function<void(const Response&)>;
-  /// Writes answers or throws; write throws Stopped when nobody listens any more.
+  /// Writes answers or throws; runs again from the start after it threw Waiting, before any answer. write throws
+  /// Stopped when nobody listens any more.
   using Handler = std::function<void(const Request&, const Write& write, Call&)>;
 
   ServerStreamCall(Runtime& runtime, WorkerPool& pool, std::string method, grpc::CallbackServerContext& context,
@@ -43,10 +46,26 @@ class ServerStreamCall final : public grpc::ServerWriteReactor<Response>,
 
  private:
   void work() {
-    end(call_.guarded([this] {
-      handler_(
-          request_, [this](const Response& message) { write(message); }, call_);
-    }));
+    try {
+      end(call_.guarded([this] {
+        handler_(
+            request_, [this](const Response& message) { write(message); }, call_);
+      }));
+    } catch (const Waiting& waiting) {
+      park(waiting);
+    }
+  }
+
+  void park(const Waiting& waiting) {
+    parking_.enter();
+    waiting.then([self = this->shared_from_this()] { self->resume(); });
+    if (call_.stopped()) onStop(StopReason::kClient);  // a stop before enter() found nobody
+  }
+
+  void resume() {
+    if (!parking_.leave()) return;
+    pool_.submit(call_.id(), 0, Entry::kContinuation, [self = this->shared_from_this()] { self->work(); });
+    if (call_.stopped()) onStop(StopReason::kClient);
   }
 
   void write(const Response& message) {
@@ -73,7 +92,7 @@ class ServerStreamCall final : public grpc::ServerWriteReactor<Response>,
 
   void onStop(StopReason reason) {
     call_.stop(reason);
-    if (pool_.withdraw(call_.id())) return end(call_.stopStatus());
+    if (parking_.leave() || pool_.withdraw(call_.id())) return end(call_.stopStatus());
     // A write that waits for a client who does not read would wait for ever.
     const std::scoped_lock lock(mutex_);
     if (writing_) context_.TryCancel();
@@ -95,6 +114,7 @@ class ServerStreamCall final : public grpc::ServerWriteReactor<Response>,
   Call call_;
   const Request& request_;
   Handler handler_;
+  Parking parking_;
   DeadlineTimer::Id timer_;
   std::mutex mutex_;
   std::condition_variable written_;

@@ -6,6 +6,8 @@
 #include <memory>
 
 #include "server/rpc/call.h"
+#include "server/rpc/parking.h"
+#include "server/scheduling/waiting.h"
 
 namespace shaped::server {
 
@@ -15,7 +17,7 @@ template <class Request, class Response>
 class UnaryCall final : public grpc::ServerUnaryReactor,
                         public std::enable_shared_from_this<UnaryCall<Request, Response>> {
  public:
-  /// Fills the response or throws; see statusOf.
+  /// Fills the response or throws; see statusOf. Runs again from the start after it threw Waiting.
   using Handler = std::function<void(const Request&, Response&, Call&)>;
 
   UnaryCall(Runtime& runtime, WorkerPool& pool, std::string method, grpc::CallbackServerContext& context,
@@ -42,12 +44,28 @@ class UnaryCall final : public grpc::ServerUnaryReactor,
 
  private:
   void work() {
-    end(call_.guarded([this] { handler_(request_, response_, call_); }));
+    try {
+      end(call_.guarded([this] { handler_(request_, response_, call_); }));
+    } catch (const Waiting& waiting) {
+      park(waiting);
+    }
+  }
+
+  void park(const Waiting& waiting) {
+    parking_.enter();
+    waiting.then([self = this->shared_from_this()] { self->resume(); });
+    if (call_.stopped()) onStop(StopReason::kClient);  // a stop before enter() found nobody
+  }
+
+  void resume() {
+    if (!parking_.leave()) return;
+    pool_.submit(call_.id(), 0, Entry::kContinuation, [self = this->shared_from_this()] { self->work(); });
+    if (call_.stopped()) onStop(StopReason::kClient);
   }
 
   void onStop(StopReason reason) {
     call_.stop(reason);
-    if (pool_.withdraw(call_.id())) end(call_.stopStatus());
+    if (parking_.leave() || pool_.withdraw(call_.id())) end(call_.stopStatus());
   }
 
   void end(const grpc::Status& status) {
@@ -66,6 +84,7 @@ class UnaryCall final : public grpc::ServerUnaryReactor,
   const Request& request_;
   Response& response_;
   Handler handler_;
+  Parking parking_;
   DeadlineTimer::Id timer_;
   std::shared_ptr<UnaryCall> self_;
 };

@@ -1,13 +1,14 @@
 """The main job, from meshes to fitted shapes: train, describe, project, synthesize, score, edit, fit, evaluate, delete."""
 
 import json
+import shutil
 import signal
 import subprocess
 import unittest
 
 import numpy
 
-from support import (BAD_INPUT, CANCELLED, NOT_CONVERGED, NOT_FOUND, SUCCESS, Daemon, DaemonCase, Result, read_obj, tube,
+from support import (BAD_INPUT, CANCELLED, DEADLINE, INTERNAL, NOT_CONVERGED, NOT_FOUND, SUCCESS, Daemon, DaemonCase, Result, read_obj, tube,
                      write_mesh, write_tubes)
 
 LABELS = ("head", "chest", "belly", "hip", "foot")
@@ -26,6 +27,48 @@ class Trained(DaemonCase):
             raise RuntimeError(result.out + result.err)
         cls.training = result.json
         cls.unseen = write_mesh(cls.folder / "unseen.obj", *tube(0.77, radius=0.33))
+
+
+class Versions(Trained):
+    def state(self, version=1):
+        for model in self.expect(SUCCESS, "models").json["models"]:
+            if model["model"] == {"name": "tubes", "version": version}:
+                return model["state"]
+        return None
+
+    def score(self, model):
+        return self.expect(SUCCESS, "score", model, self.unseen).json["model"]["version"]
+
+    def test_versions_load_swap_and_go(self):
+        self.assertEqual(self.state(), "ready")
+        self.assertEqual(len(self.expect(SUCCESS, "unload", "tubes").json["unloaded"]), 1)
+        self.assertEqual(self.state(), "stored")
+        self.assertEqual(self.score("tubes"), 1)  # waits for the load
+        self.assertEqual(self.state(), "ready")
+        folder = self.folder / "store/models/tubes"
+        shutil.copytree(folder / "1", folder / "2")
+        self.assertEqual(self.score("tubes"), 1)  # nobody asked for it yet
+        self.assertEqual(self.expect(SUCCESS, "load", "tubes").json["model"]["version"], 2)
+        self.assertEqual(self.score("tubes"), 2)
+        self.expect(SUCCESS, "label", "tubes@1", "stable")
+        self.assertEqual((self.score("tubes"), self.score("tubes@stable"), self.score("tubes@2")), (1, 1, 2))
+        self.assertIn("labelled", self.expect(BAD_INPUT, "delete", "tubes@1").message())
+        self.expect(SUCCESS, "label", "tubes", "stable", "--remove")
+        self.assertEqual(self.score("tubes"), 2)
+        shutil.copytree(folder / "1", folder / "3")
+        with open(folder / "3/tensors.safetensors", "ab") as file:
+            file.write(b"x")
+        broken = [self.expect(INTERNAL, "load", "tubes").message(), self.expect(INTERNAL, "score", "tubes@3", self.unseen).message()]
+        self.assertEqual(broken[0], broken[1])
+        self.assertEqual(self.state(3), "failed")
+        self.assertEqual(self.score("tubes"), 2)
+        self.expect(NOT_FOUND, "score", "tubes@canary", self.unseen)
+
+    def test_one_waits_for_a_model_to_come(self):
+        self.expect(DEADLINE, "--timeout", "0.5", "wait", "later")
+        with subprocess.Popen(self.command("wait", "later"), stdout=subprocess.PIPE, text=True) as waiting:
+            self.expect(SUCCESS, "train", "shell-pga", "later", *self.meshes, "--modes", 2, "--coarse-vertices", 60)
+            self.assertEqual(json.loads(waiting.communicate(timeout=60)[0]), {"name": "later", "version": 1})
 
 
 class MainJob(Trained):

@@ -30,11 +30,13 @@ struct Models {
   static void printTable(const v1::ListModelsResponse& response) {
     std::cout << std::left << std::setw(32) << "MODEL" << std::setw(11) << "KIND" << std::right << std::setw(9)
               << "VERTICES" << std::setw(8) << "SHAPES" << std::setw(7) << "MODES"
-              << "  CREATED\n";
+              << "  " << std::left << std::setw(21) << "CREATED"
+              << "  STATE\n";
     for (const auto& model : response.models())
       std::cout << std::left << std::setw(32) << modelText(model.model()) << std::setw(11) << model.kind() << std::right
                 << std::setw(9) << model.vertex_count() << std::setw(8) << model.shell_pga().training_shapes()
-                << std::setw(7) << model.shell_pga().modes() << "  " << timeText(model.created()) << "\n";
+                << std::setw(7) << model.shell_pga().modes() << "  " << timeText(model.created()) << "  "
+                << stateText(model) << "\n";
   }
 };
 

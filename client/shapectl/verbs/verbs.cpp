@@ -6,6 +6,7 @@ std::vector<Verb> allVerbs() {
   return {
       trainVerb(),                                                     //
       modelsVerb(),  describeVerb(),   deleteVerb(),                   //
+      loadVerb(),    unloadVerb(),     labelVerb(),       waitVerb(),  //
       jobsVerb(),    watchVerb(),      cancelVerb(),                   //
       projectVerb(), synthesizeVerb(), interpolateVerb(), editVerb(),  //
       fitVerb(),     scoreVerb(),      evaluateVerb(),                 //

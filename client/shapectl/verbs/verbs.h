@@ -8,6 +8,10 @@ namespace shaped::shapectl {
 
 Verb trainVerb();
 Verb modelsVerb();
+Verb loadVerb();
+Verb unloadVerb();
+Verb labelVerb();
+Verb waitVerb();
 Verb describeVerb();
 Verb deleteVerb();
 Verb jobsVerb();

@@ -188,7 +188,7 @@ TEST_CASE("faulty paths are refused by field") {
   const auto good = pathRequest(6, 1);
   auto request = good;
   request.set_path_steps(5000);
-  refused(request, "path_steps: = 5000");
+  refused(request, "path_steps: has 5000 steps");
   request = good;
   request.set_times(0, 11);
   refused(request, "times[0]: = 11");

@@ -2,10 +2,13 @@
 
 #include <catch2/catch.hpp>
 #include <fstream>
+#include <future>
 #include <thread>
 
+#include "core/io/file.h"
 #include "core/io/file_error.h"
 #include "server/convert/model.h"
+#include "server/errors/errors.h"
 #include "tests/support/models.h"
 #include "tests/support/temporary_folder.h"
 
@@ -16,6 +19,23 @@ namespace {
 
 const Provenance provenance{"tubes", std::chrono::system_clock::time_point(std::chrono::seconds(1'700'000'000))};
 
+/// Pins on a thread that may wait.
+ServedModelPtr pinNow(ModelStore& store, const ModelSelector& selector) {
+  while (true) try {
+      return store.pin(selector);
+    } catch (const Waiting& waiting) {
+      std::promise<void> came;
+      waiting.then([&came] { came.set_value(); });
+      came.get_future().wait();
+    }
+}
+
+/// A folder with this many versions of "m".
+void publishVersions(const std::filesystem::path& folder, int count) {
+  ModelStore store(folder);
+  for (int i = 0; i < count; ++i) store.publish("m", test::tubeModel(), provenance);
+}
+
 }  // namespace
 
 TEST_CASE("a published model is served at once, and by the next daemon") {
@@ -24,27 +44,27 @@ TEST_CASE("a published model is served at once, and by the next daemon") {
     ModelStore store(folder.path());
     CHECK(store.publish("m", test::tubeModel(), provenance)->version == 1);
     CHECK(store.publish("m", test::tubeModel(), provenance)->version == 2);
-    CHECK(store.pin("m", 0)->version == 2);
-    CHECK(store.pin("m", 1)->shell_pga == test::tubeModel());  // still in memory
+    CHECK(store.pin({"m", 0, ""})->version == 2);
+    CHECK(store.pin({"m", 0, ""})->shell_pga == test::tubeModel());  // still in memory
   }
   ModelStore store(folder.path());
-  const auto model = store.pin("m", 1);
+  const auto model = pinNow(store, {"m", 1, ""});
   CHECK(model->shell_pga->topology().id() == test::tubeModel()->topology().id());
   CHECK((model->shell_pga->mean() - test::tubeModel()->mean()).cwiseAbs().maxCoeff() < 1e-12);
   CHECK(provenanceOf(model->manifest).dataset == "tubes");
   CHECK(provenanceOf(model->manifest).created == provenance.created);
-  CHECK(store.pin("m", 1) == model);
+  CHECK(pinNow(store, {"m", 1, ""}) == model);
 }
 
 TEST_CASE("what is not there is not found") {
   const test::TemporaryFolder folder;
   ModelStore store(folder.path());
-  CHECK_THROWS_AS(store.pin("m", 0), ModelNotFound);
+  CHECK_THROWS_AS(pinNow(store, {"m", 0, ""}), ModelNotFound);
   store.publish("m", test::tubeModel(), provenance);
-  CHECK_THROWS_AS(store.pin("m", 2), ModelNotFound);
+  CHECK_THROWS_AS(pinNow(store, {"m", 2, ""}), ModelNotFound);
   CHECK_THROWS_AS(store.remove("m", 2), ModelNotFound);
   CHECK_THROWS_AS(store.remove("n", 0), ModelNotFound);
-  CHECK_THROWS_AS(store.pin("../m", 0), InvalidInput);
+  CHECK_THROWS_AS(pinNow(store, {"../m", 0, ""}), InvalidInput);
 }
 
 TEST_CASE("a pinned model outlives its removal") {
@@ -52,20 +72,11 @@ TEST_CASE("a pinned model outlives its removal") {
   ModelStore store(folder.path());
   store.publish("m", test::tubeModel(), provenance);
   store.publish("m", test::tubeModel(), provenance);
-  const auto pinned = store.pin("m", 1);
+  const auto pinned = pinNow(store, {"m", 1, ""});
   CHECK(store.remove("m", 0) == std::vector<std::uint64_t>{1, 2});
   CHECK(pinned->shell_pga->modes() == 2);
-  CHECK_THROWS_AS(store.pin("m", 1), ModelNotFound);
+  CHECK_THROWS_AS(pinNow(store, {"m", 1, ""}), ModelNotFound);
   CHECK(store.list().empty());
-}
-
-TEST_CASE("the store keeps only the models used last in memory") {
-  const test::TemporaryFolder folder;
-  ModelStore store(folder.path(), 1);
-  std::weak_ptr<const ServedModel> first = store.publish("a", test::tubeModel(), provenance);
-  store.publish("b", test::tubeModel(), provenance);
-  CHECK(first.expired());
-  CHECK(store.pin("a", 0)->name == "a");
 }
 
 TEST_CASE("many who want one model wait for one load") {
@@ -75,7 +86,7 @@ TEST_CASE("many who want one model wait for one load") {
   std::vector<ServedModelPtr> pinned(8);
   {
     std::vector<std::jthread> threads;
-    for (auto& model : pinned) threads.emplace_back([&] { model = store.pin("m", 0); });
+    for (auto& model : pinned) threads.emplace_back([&] { model = pinNow(store, {"m", 0, ""}); });
   }
   for (const auto& model : pinned) CHECK(model == pinned.front());
 }
@@ -90,7 +101,7 @@ TEST_CASE("a damaged model is reported by name, and the list leaves a damaged ma
   std::ofstream(folder.path() / "m/1/tensors.safetensors", std::ios::app) << "x";
   std::ofstream(folder.path() / "n/1/manifest.json") << "{";
   ModelStore store(folder.path());
-  CHECK_THROWS_AS(store.pin("m", 0), FileError);
+  CHECK_THROWS_AS(pinNow(store, {"m", 0, ""}), FileError);
   REQUIRE(store.list().size() == 1);
   CHECK(store.list().front().name == "m");
 }
@@ -102,10 +113,159 @@ TEST_CASE("list and description agree") {
   v1::ModelDescription listed, described;
   toProto(store.list().front(), listed);
   toProto(*model, described);
+  toProto(store.standing("m", 1), described);
   CHECK(described.shell_pga().eigenvalues_size() == 4);
   CHECK(described.training().termination() == v1::TERMINATION_CONVERGED);
   described.mutable_shell_pga()->clear_eigenvalues();
   described.clear_training();
   listed.clear_training();
   CHECK(listed.SerializeAsString() == described.SerializeAsString());
+}
+
+TEST_CASE("a model that is not in memory is waited for without a thread") {
+  const test::TemporaryFolder folder;
+  publishVersions(folder.path(), 1);
+  ModelStore store(folder.path());
+  CHECK(store.list().front().state == ModelState::kStored);
+  CHECK_THROWS_AS(store.pin({"m", 0, ""}), Waiting);
+  CHECK(pinNow(store, {"m", 0, ""})->version == 1);
+  CHECK(store.list().front().state == ModelState::kReady);
+  CHECK(store.loaded().size() == 1);
+}
+
+TEST_CASE("a broken model fails each time alike, until its files change") {
+  const test::TemporaryFolder folder;
+  publishVersions(folder.path(), 1);
+  const auto tensors = folder.path() / "m/1/tensors.safetensors";
+  const auto good = readFile(tensors);
+  std::ofstream(tensors, std::ios::app) << "x";
+  ModelStore store(folder.path());
+  std::string first;
+  for (int attempt = 0; attempt < 3; ++attempt) try {
+      pinNow(store, {"m", 0, ""});
+      FAIL("it must not load");
+    } catch (const FileError& error) {
+      if (first.empty()) first = error.what();
+      CHECK(error.what() == first);
+    }
+  CHECK(store.list().front().state == ModelState::kFailed);
+  CHECK_THROWS_AS(store.pin({"m", 0, ""}), FileError);  // at once
+  writeFile(tensors, good);
+  CHECK(pinNow(store, {"m", 0, ""})->version == 1);
+}
+
+TEST_CASE("what another process puts into the store counts once it is loaded") {
+  const test::TemporaryFolder folder;
+  publishVersions(folder.path(), 1);
+  ModelStore store(folder.path());
+  const auto before = pinNow(store, {"m", 0, ""});
+  std::filesystem::copy(folder.path() / "m/1", folder.path() / "m/2", std::filesystem::copy_options::recursive);
+  CHECK(store.pin({"m", 0, ""}) == before);
+  CHECK(store.load("m", 0)->wait()->version == 2);
+  CHECK(store.pin({"m", 0, ""})->version == 2);
+  CHECK(before->shell_pga->modes() == 2);            // who holds it keeps it
+  CHECK(store.loaded().size() == 1);                 // the store does not
+  CHECK(pinNow(store, {"m", 1, ""})->version == 1);  // by number it can still be had
+  CHECK(store.pin({"m", 0, ""})->version == 2);
+}
+
+TEST_CASE("a load that fails leaves the version before") {
+  const test::TemporaryFolder folder;
+  publishVersions(folder.path(), 1);
+  ModelStore store(folder.path());
+  const auto before = pinNow(store, {"m", 0, ""});
+  std::filesystem::copy(folder.path() / "m/1", folder.path() / "m/2", std::filesystem::copy_options::recursive);
+  std::ofstream(folder.path() / "m/2/tensors.safetensors", std::ios::app) << "x";
+  CHECK_THROWS_AS(store.load("m", 0)->wait(), FileError);
+  CHECK(store.pin({"m", 0, ""}) == before);
+}
+
+TEST_CASE("loading again replaces the model in memory") {
+  const test::TemporaryFolder folder;
+  publishVersions(folder.path(), 1);
+  ModelStore store(folder.path());
+  const auto before = pinNow(store, {"m", 0, ""});
+  const auto after = store.load("m", 0)->wait();
+  CHECK(after != before);
+  CHECK(store.pin({"m", 0, ""}) == after);
+}
+
+TEST_CASE("labels stand for versions, for good") {
+  const test::TemporaryFolder folder;
+  publishVersions(folder.path(), 3);
+  {
+    ModelStore store(folder.path());
+    store.setLabel("m", "stable", 2);
+    store.setLabel("m", "canary", 3);
+    CHECK_THROWS_AS(store.setLabel("m", "canary", 4), ModelNotFound);
+    CHECK_THROWS_AS(store.setLabel("m", "../x", 1), InvalidInput);
+    CHECK_THROWS_AS(store.setLabel("n", "stable", 1), ModelNotFound);
+  }
+  ModelStore store(folder.path());
+  CHECK(pinNow(store, {"m", 0, ""})->version == 2);
+  CHECK(pinNow(store, {"m", 0, "canary"})->version == 3);
+  CHECK_THROWS_AS(store.pin({"m", 0, "old"}), ModelNotFound);
+  CHECK_THROWS_AS(store.pin({"m", 1, "stable"}), InvalidInput);
+  CHECK_THROWS_AS(store.remove("m", 2), WrongState);
+  CHECK(store.remove("m", 1) == std::vector<std::uint64_t>{1});
+  store.setLabel("m", "stable", 0);
+  CHECK(pinNow(store, {"m", 0, ""})->version == 3);
+  CHECK(store.remove("m", 2) == std::vector<std::uint64_t>{2});
+  CHECK(store.remove("m", 0) == std::vector<std::uint64_t>{3});
+  CHECK_THROWS_AS(store.pin({"m", 0, "canary"}), ModelNotFound);
+}
+
+TEST_CASE("the memory budget drops what was used longest ago, and never what a request holds") {
+  const test::TemporaryFolder folder;
+  const auto bytes = test::tubeModel()->memoryBytes();
+  ModelStore store(folder.path(), {.memory_budget = 2 * bytes + bytes / 2, .loaders = 1});
+  for (const auto* name : {"a", "b", "c"}) store.publish(name, test::tubeModel(), provenance);
+  REQUIRE(store.loaded().size() == 2);
+  CHECK(store.loaded()[0]->name == "b");
+  const auto held = store.pin({"b", 0, ""});
+  const auto also = pinNow(store, {"a", 0, ""});  // c goes
+  CHECK(store.loaded()[0]->name == "a");
+  CHECK(store.loaded()[1]->name == "b");
+  CHECK_THROWS_AS(pinNow(store, {"c", 0, ""}), OverBudget);
+}
+
+TEST_CASE("a model larger than the whole budget is published, but not served") {
+  const test::TemporaryFolder folder;
+  ModelStore store(folder.path(), {.memory_budget = 1000, .loaders = 1});
+  CHECK(store.publish("m", test::tubeModel(), provenance)->version == 1);
+  CHECK(store.loaded().empty());
+  try {
+    pinNow(store, {"m", 0, ""});
+    FAIL("it must not load");
+  } catch (const OverBudget& error) {
+    CHECK_FALSE(error.mayPass());
+  }
+}
+
+TEST_CASE("what is unloaded is loaded again when wanted") {
+  const test::TemporaryFolder folder;
+  publishVersions(folder.path(), 2);
+  ModelStore store(folder.path());
+  for (const std::uint64_t version : {1, 2}) pinNow(store, {"m", version, ""});
+  CHECK(store.unload("m", 1) == std::vector<std::uint64_t>{1});
+  CHECK(store.unload("m", 0) == std::vector<std::uint64_t>{2});
+  CHECK(store.unload("m", 0).empty());
+  CHECK_THROWS_AS(store.unload("n", 0), ModelNotFound);
+  CHECK(pinNow(store, {"m", 0, ""})->version == 2);
+}
+
+TEST_CASE("one can wait for a model that is still to come") {
+  const test::TemporaryFolder folder;
+  ModelStore store(folder.path());
+  int woken = 0;
+  try {
+    store.ready({"m", 0, ""});
+    FAIL("it is not there");
+  } catch (const Waiting& waiting) {
+    waiting.then([&] { ++woken; });
+  }
+  CHECK(woken == 0);
+  store.publish("m", test::tubeModel(), provenance);
+  CHECK(woken == 1);
+  CHECK(store.ready({"m", 0, ""})->version == 1);
 }
