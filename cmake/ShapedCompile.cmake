@@ -23,13 +23,21 @@ if(SHAPED_SANITIZE)
   add_compile_options(-fsanitize=${SHAPED_SANITIZE} -fno-omit-frame-pointer)
   add_link_options(-fsanitize=${SHAPED_SANITIZE})
 endif()
+if(SHAPED_FUZZ)
+  # Whatever a sanitizer or an assertion of the standard library sees ends the program: that is how libFuzzer notices.
+  add_compile_options(-fno-sanitize-recover=all)
+  add_compile_definitions(_GLIBCXX_ASSERTIONS)
+endif()
 
 # Ceres drags ATLAS onto the link line, which would then serve CHOLMOD's dgemm at less than half the speed.
 add_link_options("LINKER:--push-state,--no-as-needed,-lopenblas,--pop-state")
 
 # GCC 12 sees overlapping copies in "literal" + std::string (its bug 105651).
-set(SHAPED_WARNINGS -Wall -Wextra -Wpedantic -Wshadow -Wnon-virtual-dtor -Werror -Wno-restrict)
-if(SHAPED_SANITIZE)
+set(SHAPED_WARNINGS -Wall -Wextra -Wpedantic -Wshadow -Wnon-virtual-dtor -Werror)
+if(CMAKE_CXX_COMPILER_ID STREQUAL "GNU")
+  list(APPEND SHAPED_WARNINGS -Wno-restrict)
+endif()
+if(SHAPED_SANITIZE AND CMAKE_CXX_COMPILER_ID STREQUAL "GNU")
   # Its instrumentation hides initialisations from this warning, which then fires in OpenMesh and the standard library.
   list(APPEND SHAPED_WARNINGS -Wno-maybe-uninitialized)
 endif()
