@@ -3,7 +3,6 @@
 #include <Eigen/Geometry>
 #include <algorithm>
 #include <numeric>
-#include <unordered_map>
 
 #include "core/numerics/error.h"
 
@@ -11,6 +10,7 @@ namespace shaped {
 namespace {
 
 std::string facePath(Eigen::Index face) { return "faces[" + std::to_string(face) + "]"; }
+std::string vertexPath(Eigen::Index vertex) { return "vertices[" + std::to_string(vertex) + "]"; }
 
 /// One side of an edge: the face and the corner opposite the edge.
 struct HalfEdge {
@@ -93,37 +93,29 @@ void Topology::buildEdges() {
 }
 
 void Topology::checkVertexFans() const {
-  // A fan has one more edge than faces at the boundary, as many inside; its faces hang together through shared edges.
-  std::vector<std::int32_t> face_count(vertex_count_, 0), linked(vertex_count_, 0);
-  for (Eigen::Index f = 0; f < faces_.rows(); ++f)
-    for (int c = 0; c < 3; ++c) ++face_count[faces_(f, c)];
-  std::vector<std::int32_t> edge_count(vertex_count_, 0);
-  for (const auto& edge : edges_) ++edge_count[edge[0]], ++edge_count[edge[1]];
-  for (const auto& hinge : hinges_) ++linked[hinge.vertices[0]], ++linked[hinge.vertices[1]];
-  // Every fan gives one boundary pair (edges = faces + 1, links = faces - 1) or a full circle (all three equal).
-  for (std::int32_t v = 0; v < vertex_count_; ++v) {
-    if (face_count[v] == 0)
-      throw InvalidInput("vertices[" + std::to_string(v) + "]", "belongs to no face; remove unused vertices");
-    if (edge_count[v] > face_count[v] + 1)
-      throw InvalidInput("vertices[" + std::to_string(v) + "]", "joins several sheets in one point; split it");
-  }
-  // Two full circles in one vertex keep all three counts equal, so walk around: the fan met first must hold all faces.
-  std::vector<std::vector<std::array<std::int32_t, 2>>> spokes(vertex_count_);
-  for (Eigen::Index f = 0; f < faces_.rows(); ++f)
-    for (int c = 0; c < 3; ++c) spokes[faces_(f, c)].push_back({faces_(f, (c + 1) % 3), faces_(f, (c + 2) % 3)});
-  for (std::int32_t v = 0; v < vertex_count_; ++v) {
-    std::unordered_map<std::int32_t, std::int32_t> next;
-    for (const auto& [a, b] : spokes[v]) next[a] = b;
-    std::int32_t start = spokes[v][0][0];
-    for (const auto& [a, b] : spokes[v])
-      if (std::none_of(spokes[v].begin(), spokes[v].end(), [a = a](const auto& s) { return s[1] == a; })) start = a;
-    std::size_t met = 0;
-    for (auto at = next.find(start); at != next.end() && met < spokes[v].size(); at = next.find(at->second)) {
-      ++met;
-      if (at->second == start) break;
-    }
-    if (met != spokes[v].size())
-      throw InvalidInput("vertices[" + std::to_string(v) + "]", "joins several sheets in one point; split it");
+  // Of more vertices than corners, one of the first is unused: a count far beyond the faces costs no memory.
+  std::vector<char> used(static_cast<std::size_t>(std::min<Eigen::Index>(vertex_count_, faces_.size() + 1)), 0);
+  for (const auto vertex : faces_.reshaped())
+    if (static_cast<std::size_t>(vertex) < used.size()) used[vertex] = 1;
+  if (const auto unused = std::find(used.begin(), used.end(), 0); unused != used.end())
+    throw InvalidInput(vertexPath(unused - used.begin()), "belongs to no face; remove unused vertices");
+  // The corners at a vertex hang together through the edges there. As an edge has at most two faces, a group of them is a
+  // fan, open or closed, and the vertex must have one group.
+  std::vector<std::int32_t> parent(static_cast<std::size_t>(faces_.size()));
+  std::iota(parent.begin(), parent.end(), 0);
+  const auto cornerOf = [&](std::int32_t face, std::int32_t vertex) {
+    const int corner = faces_(face, 0) == vertex ? 0 : faces_(face, 1) == vertex ? 1 : 2;
+    return findRoot(parent, 3 * face + corner);
+  };
+  for (const auto& hinge : hinges_)
+    for (const auto vertex : {hinge.vertices[0], hinge.vertices[1]})
+      parent[cornerOf(hinge.faces[0], vertex)] = cornerOf(hinge.faces[1], vertex);
+  std::vector<std::int32_t> group(vertex_count_, -1);
+  for (std::int32_t corner = 0; corner < faces_.size(); ++corner) {
+    const auto vertex = faces_(corner / 3, corner % 3), root = findRoot(parent, corner);
+    if (group[vertex] >= 0 && group[vertex] != root)
+      throw InvalidInput(vertexPath(vertex), "joins several sheets in one point; split it");
+    group[vertex] = root;
   }
 }
 

@@ -1,6 +1,7 @@
 #include "core/mesh/topology.h"
 
 #include <catch2/catch.hpp>
+#include <limits>
 
 #include "core/numerics/error.h"
 
@@ -70,6 +71,19 @@ TEST_CASE("faulty connectivity is refused with the place named") {
   Faces cones(8, 3);  // two closed tetrahedra that share vertex 0 only
   cones << tetrahedron, tetrahedron.unaryExpr([](int v) { return v == 0 ? 0 : v + 3; });
   CHECK_THROWS_WITH(Topology(7, cones), Catch::Contains("vertices[0]: joins several sheets"));
+}
+
+TEST_CASE("a count of vertices far beyond the faces is refused before it costs memory") {
+  constexpr auto most = std::numeric_limits<std::int32_t>::max();
+  CHECK_THROWS_WITH(Topology(most, faces({{0, 1, 3}})), Catch::Contains("vertices[2]: belongs to no face"));
+}
+
+TEST_CASE("a vertex with very many faces costs no more than as many vertices") {
+  constexpr int spokes = 200000;  // minutes, when it takes the square of it
+  Faces wheel(spokes, 3);
+  for (int s = 0; s < spokes; ++s) wheel.row(s) << 0, s + 1, (s + 1) % spokes + 1;
+  CHECK(Topology(spokes + 1, wheel).hinges().size() == spokes);
+  CHECK_NOTHROW(Topology(spokes + 1, Faces(wheel.topRows(spokes - 1))));  // open, still one fan
 }
 
 TEST_CASE("faulty positions are refused with the place named") {
