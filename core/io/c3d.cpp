@@ -131,11 +131,14 @@ Layout layoutOf(const std::string& file, std::string_view bytes, const Header& h
   return layout;
 }
 
+/// POINT:LABELS, LABELS2, ... hold at most 255 labels each; those beyond the points are not looked at.
 std::vector<std::string> labelsOf(const C3dParameters& parameters, std::int64_t points) {
-  auto labels = parameters.texts("POINT", "LABELS");
-  for (int part = 2; parameters.has("POINT", "LABELS" + std::to_string(part)); ++part)
-    for (auto& label : parameters.texts("POINT", "LABELS" + std::to_string(part))) labels.push_back(std::move(label));
-  labels.resize(static_cast<std::size_t>(points));
+  const auto wanted = static_cast<std::size_t>(points);
+  auto labels = parameters.texts("POINT", "LABELS", wanted);
+  for (int part = 2; labels.size() < wanted && parameters.has("POINT", "LABELS" + std::to_string(part)); ++part)
+    for (auto& label : parameters.texts("POINT", "LABELS" + std::to_string(part), wanted - labels.size()))
+      labels.push_back(std::move(label));
+  labels.resize(wanted);
   for (std::size_t i = 0; i < labels.size(); ++i)
     if (labels[i].empty()) labels[i] = "unlabelled_" + std::to_string(i + 1);
   return labels;
@@ -153,7 +156,7 @@ Eigen::RowVector3d readPoint(const char* at, const Layout& layout, const C3dNumb
 }
 
 double metresPerUnit(const std::string& file, const C3dParameters& parameters) {
-  const auto units = parameters.texts("POINT", "UNITS");
+  const auto units = parameters.texts("POINT", "UNITS", 1);
   if (units.empty() || units.front().empty()) return 1e-3;
   if (const auto metres = metresPer(units.front())) return *metres;
   throw InvalidInput(file, "has POINT:UNITS " + quotedWord(units.front()) + "; want mm, cm, dm, m, in or ft");

@@ -41,7 +41,7 @@ C3dParameters::C3dParameters(const std::string& file, std::string_view bytes, st
     const auto distance_at = at + item.position();
     const std::size_t distance = numbers_.word(item.take(2).data());
     if (id < 0)
-      groups_.push_back({-id, name});
+      groups_.emplace(name, -id);
     else
       addParameter(file, bytes.substr(at + item.position()), id, name);
     if (distance == 0) return;
@@ -51,36 +51,34 @@ C3dParameters::C3dParameters(const std::string& file, std::string_view bytes, st
 
 void C3dParameters::addParameter(const std::string& file, std::string_view content, int group, std::string name) {
   ByteReader reader(file, content);
-  Parameter parameter{group, std::move(name), reader.number<std::int8_t>(std::endian::little), {}, {}};
+  Parameter parameter{reader.number<std::int8_t>(std::endian::little), {}, {}};
   const int dimensions = reader.number<std::uint8_t>(std::endian::little);
   std::size_t count = 1;
   for (int d = 0; d < dimensions; ++d) {
     parameter.extents.push_back(reader.number<std::uint8_t>(std::endian::little));
     count *= parameter.extents.back();
     if (count > content.size())
-      throw InvalidInput(file, "has the parameter " + quotedWord(parameter.name) + " that is larger than the file");
+      throw InvalidInput(file, "has the parameter " + quotedWord(name) + " that is larger than the file");
   }
   const auto size = static_cast<std::size_t>(std::abs(parameter.type));
   if (size != 1 && size != 2 && size != 4) return;  // a type that we do not know, and do not need
   parameter.data = reader.take(count * size);
-  parameters_.push_back(std::move(parameter));
+  parameters_.emplace(std::pair(group, std::move(name)), std::move(parameter));
 }
 
 const C3dParameters::Parameter* C3dParameters::find(std::string_view group, std::string_view name) const {
-  for (const auto& parameter : parameters_) {
-    if (parameter.name != name) continue;
-    for (const auto& known : groups_)
-      if (known.id == parameter.group && known.name == group) return &parameter;
-  }
-  return nullptr;
+  const auto known = groups_.find(group);
+  if (known == groups_.end()) return nullptr;
+  const auto found = parameters_.find(std::pair(known->second, std::string(name)));
+  return found == parameters_.end() ? nullptr : &found->second;
 }
 
-std::vector<std::string> C3dParameters::texts(std::string_view group, std::string_view name) const {
+std::vector<std::string> C3dParameters::texts(std::string_view group, std::string_view name, std::size_t most) const {
   const auto* parameter = find(group, name);
   if (!parameter || parameter->type != -1) return {};
   const auto length = parameter->extents.empty() ? 1 : parameter->extents.front();
   std::vector<std::string> entries;
-  for (std::size_t at = 0; length > 0 && at + length <= parameter->data.size(); at += length)
+  for (std::size_t at = 0; length > 0 && entries.size() < most && at + length <= parameter->data.size(); at += length)
     entries.push_back(trimmed(parameter->data.substr(at, length)));
   return entries;
 }

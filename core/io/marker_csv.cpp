@@ -73,6 +73,12 @@ Header readHeader(TextScanner& scanner, const std::string& file) {
   throw InvalidInput(file, "has no header line 'frame,label_x,label_y,label_z,...'");
 }
 
+/// Frames a second of a trial that lasts so long [s]; 0 where the times do not say.
+double rateOf(std::size_t frames, double duration) {
+  const double rate = static_cast<double>(frames - 1) / duration;
+  return duration > 0 && std::isfinite(rate) ? rate : 0;
+}
+
 }  // namespace
 
 MarkerTrial parseMarkerCsv(const std::string& file, std::string_view text) {
@@ -85,10 +91,11 @@ MarkerTrial parseMarkerCsv(const std::string& file, std::string_view text) {
   while (scanner.nextContentLine('#')) {
     const auto fields = scanner.fields(',');
     const auto frame = scanner.integerIn(fields[0], "the frame number");
-    if (last_frame && frame != *last_frame + 1)
+    if (last_frame && (frame <= *last_frame || frame - 1 != *last_frame))
       scanner.fail("frame " + std::to_string(frame) + " follows frame " + std::to_string(*last_frame) +
                    "; write a row for every frame, with blank fields where nothing was seen");
     last_frame = frame;
+    requireFilledRows(scanner, trial.frames.size() + 1, trial.labels.size(), text.size());
     if (header.has_time) {
       last_time = scanner.numberIn(fields.size() > 1 ? fields[1] : std::string_view(), "the time in seconds");
       if (trial.frames.empty()) first_time = last_time;
@@ -97,8 +104,7 @@ MarkerTrial parseMarkerCsv(const std::string& file, std::string_view text) {
     trial.frames.push_back(parseMarkerRow(scanner, coordinates, trial.labels, header.metres, false));
   }
   if (trial.frames.empty()) throw InvalidInput(file, "has no frames");
-  if (trial.rate_hz == 0 && std::isfinite(last_time - first_time) && last_time > first_time)
-    trial.rate_hz = static_cast<double>(trial.frames.size() - 1) / (last_time - first_time);
+  if (trial.rate_hz == 0) trial.rate_hz = rateOf(trial.frames.size(), last_time - first_time);
   return trial;
 }
 

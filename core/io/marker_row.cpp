@@ -28,4 +28,12 @@ Vertices parseMarkerRow(const TextScanner& scanner, std::span<const std::string_
   return frame;
 }
 
+void requireFilledRows(const TextScanner& scanner, std::size_t rows, std::size_t labels, std::size_t bytes) {
+  constexpr std::size_t most_omitted = 1 << 24;
+  // A field that is there, blank or not, is followed by a separator: it takes a byte at least.
+  if (rows * labels * 3 > bytes + most_omitted)
+    scanner.fail("rows of " + std::to_string(labels) + " markers leave out more than " + std::to_string(most_omitted) +
+                 " fields at their ends; write their separators");
+}
+
 }  // namespace shaped

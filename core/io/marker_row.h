@@ -1,5 +1,6 @@
 #pragma once
 
+#include <cstddef>
 #include <span>
 #include <string>
 #include <string_view>
@@ -16,5 +17,9 @@ namespace shaped {
 /// there.
 Vertices parseMarkerRow(const TextScanner& scanner, std::span<const std::string_view> fields,
                         const std::vector<std::string>& labels, double metres, bool zero_is_missing);
+
+/// Fails at the scanner's line when a table of `bytes` bytes leaves out more than 2^24 fields at the ends of its rows:
+/// short rows under many labels would make gigabytes of a small file. rows: those met so far, the current one included.
+void requireFilledRows(const TextScanner& scanner, std::size_t rows, std::size_t labels, std::size_t bytes);
 
 }  // namespace shaped

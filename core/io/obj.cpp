@@ -10,7 +10,7 @@ std::int64_t cornerIndex(const TextScanner& scanner, std::string_view word, std:
   std::int64_t index = 0;
   if (!parseInteger(word.substr(0, word.find('/')), index) || index == 0)
     scanner.fail(quotedWord(word) + " is no face corner; want v, v/t, v//n or v/t/n with v counted from 1");
-  if (index < 0 && -index > vertex_count)
+  if (index < -vertex_count)
     scanner.fail("corner " + quotedWord(word) + " counts back beyond the first of " + std::to_string(vertex_count) +
                  " vertices");
   return index > 0 ? index - 1 : vertex_count + index;

@@ -68,6 +68,7 @@ MarkerTrial parseTrc(const std::string& file, std::string_view text) {
     if (scanner.restOfLine().find_first_not_of(" \t") == std::string_view::npos) continue;
     const auto fields = scanner.fields('\t');
     scanner.integerIn(fields[0], "the frame number");
+    requireFilledRows(scanner, trial.frames.size() + 1, trial.labels.size(), text.size());
     const auto coordinates = std::span(fields).subspan(std::min<std::size_t>(2, fields.size()));
     trial.frames.push_back(parseMarkerRow(scanner, coordinates, trial.labels, header.metres, true));
   }

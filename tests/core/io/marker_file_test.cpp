@@ -140,6 +140,23 @@ TEST_CASE("marker CSV reads units, rate, time and missing markers") {
   CHECK(parseMarkerCsv("a.csv", "# rate: 30\nframe,A_x,A_y,A_z\n1,0,0,0\n").rate_hz == 30);
 }
 
+TEST_CASE("short rows under many labels do not make gigabytes of a small file") {
+  constexpr int labels = 2000, rows = 10000;
+  std::string trc_labels, csv = "frame", trc_rows;
+  for (int l = 0; l < labels; ++l) trc_labels += "\ta\t\t", csv += ",a_x,a_y,a_z";
+  csv += "\n";
+  for (int r = 0; r < rows; ++r) csv += std::to_string(r) + "\n", trc_rows += "1\n";
+  const std::string trc = "PathFileType\nDataRate\tNumFrames\tNumMarkers\tUnits\n1\t10000\t2000\tmm\nFrame#\tTime" +
+                          trc_labels + "\n\n" + trc_rows;
+  CHECK_THROWS_WITH(parseMarkerCsv("a.csv", csv), Contains("leave out more than 16777216 fields"));
+  CHECK_THROWS_WITH(parseTrc("a.trc", trc), Contains("leave out more than 16777216 fields"));
+}
+
+TEST_CASE("a rate that the times of a marker CSV do not determine is unknown") {
+  CHECK(parseMarkerCsv("a.csv", "frame,time,A_x,A_y,A_z\n1,0,1,2,3\n2,5e-324,1,2,3\n").rate_hz == 0);
+  CHECK(parseMarkerCsv("a.csv", "frame,time,A_x,A_y,A_z\n1,0,1,2,3\n").rate_hz == 0);
+}
+
 TEST_CASE("faulty marker CSV files are refused with file and line") {
   struct Case {
     std::string text, error;

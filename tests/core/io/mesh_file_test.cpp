@@ -198,6 +198,7 @@ TEST_CASE("faulty mesh files are refused with the file, the place and the reason
       {"a.obj", "v 0 0 zero\n", "a.obj:1: 'zero' is not a number; want z"},
       {"a.obj", "v 0 0 0\nf 1 1\n", "a.obj:2: a face has fewer than 3 corners"},
       {"a.obj", "v 0 0 0\nf 0 1 1\n", "a.obj:2: '0' is no face corner"},
+      {"a.obj", "v 0 0 0\nf -9223372036854775808 1 1\n", "a.obj:2: corner '-9223372036854775808' counts back beyond"},
       {"a.obj", "v 0 0 0\nf -2 1 1\n", "a.obj:2: corner '-2' counts back beyond the first of 1 vertices"},
       {"a.obj", "v 0 0 0\nf 1 1 1\nf 1 1 5\n",
        "a.obj: face 1 has vertex index 4 (counted from 0), outside the file's 1"},
