@@ -1,6 +1,7 @@
 #include "client/shapectl/coefficients.h"
 
 #include "core/io/file.h"
+#include "core/io/json_fields.h"
 #include "core/numerics/error.h"
 
 namespace shaped::shapectl {
@@ -14,9 +15,8 @@ void writeCoefficients(const std::filesystem::path& path, const v1::Coefficients
 }
 
 v1::Coefficients readCoefficients(const std::filesystem::path& path) {
-  const auto text = readFile(path);
+  auto document = parseJson(path.string(), readFile(path));
   try {
-    auto document = nlohmann::json::parse(text);
     if (document.contains("coefficients")) document = document.at("coefficients");
     v1::Coefficients coefficients;
     for (const auto& weight : document.at("alpha")) coefficients.add_alpha(weight.get<double>());

@@ -4,10 +4,12 @@
 #include <unistd.h>
 
 #include <algorithm>
+#include <limits>
 
 #include "core/io/file.h"
 #include "core/io/file_error.h"
 #include "core/io/folder.h"
+#include "core/io/json_fields.h"
 #include "core/io/sha256.h"
 #include "core/io/text_scanner.h"
 
@@ -102,14 +104,17 @@ ScratchFolder beginPublishing(const fs::path& folder) {
 
 ModelManifest readManifest(const fs::path& path) {
   try {
-    const auto document = json::parse(readFile(path));
+    const auto document = parseJson("manifest", readFile(path));
     ModelManifest manifest;
     document.at("kind").get_to(manifest.kind);
-    document.at("format_version").get_to(manifest.format_version);
+    manifest.format_version =
+        static_cast<int>(requireWholeNumber(document, "format_version", 1, std::numeric_limits<int>::max()));
     document.at("created_by").get_to(manifest.created_by);
     document.at("tensors").at("sha256").get_to(manifest.tensors_sha256);
-    document.at("tensors").at("bytes").get_to(manifest.tensors_bytes);
+    manifest.tensors_bytes = static_cast<std::uint64_t>(
+        requireWholeNumber(document.at("tensors"), "bytes", 0, std::numeric_limits<std::int64_t>::max()));
     manifest.description = document.at("description");
+    if (!manifest.description.is_object()) throw InvalidInput("description", "must be a JSON object");
     return manifest;
   } catch (const json::exception& problem) {
     throw FileError(path.string(), std::string("is no model manifest: ") + problem.what());

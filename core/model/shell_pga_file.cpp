@@ -1,18 +1,26 @@
 #include "core/model/shell_pga_file.h"
 
+#include <cmath>
 #include <limits>
 
 #include "core/io/file_error.h"
+#include "core/io/json_fields.h"
 
 namespace shaped {
 namespace {
 
 constexpr int kFormatVersion = 1;
+constexpr int kMostCount = 1'000'000'000;  ///< of anything that a description counts
+constexpr int kMostPathSteps = 1'000'000;
 constexpr const char *kSymmetricName = "symmetric", *kDirectedName = "directed";
 
 nlohmann::json toJson(const Outcome& outcome) {
   return {
       {"termination", name(outcome.termination)}, {"iterations", outcome.iterations}, {"residual", outcome.residual}};
+}
+
+int countIn(const nlohmann::json& description, const char* field, int least) {
+  return static_cast<int>(requireWholeNumber(description, field, least, kMostCount));
 }
 
 Outcome outcomeFrom(const nlohmann::json& json) {
@@ -21,7 +29,7 @@ Outcome outcomeFrom(const nlohmann::json& json) {
   for (const auto kind : {Termination::kConverged, Termination::kIterationLimit, Termination::kStalled,
                           Termination::kCancelled, Termination::kNumericalFailure})
     if (name(kind) == text) outcome.termination = kind;
-  outcome.iterations = json.at("iterations").get<int>();
+  outcome.iterations = countIn(json, "iterations", 0);
   // JSON has no infinities: a residual that is not finite is written as null
   const auto& residual = json.at("residual");
   outcome.residual = residual.is_null() ? std::numeric_limits<double>::infinity() : residual.get<double>();
@@ -58,10 +66,12 @@ SparseRows sparseFrom(const TensorFile& tensors, const std::string& name, Eigen:
   std::vector<Eigen::Triplet<double>> triplets;
   triplets.reserve(values.size());
   for (Eigen::Index row = 0; row < rows; ++row) {
-    if (begin[static_cast<std::size_t>(row)] > begin[static_cast<std::size_t>(row) + 1]) fail("has broken row limits");
-    for (auto k = begin[static_cast<std::size_t>(row)]; k < begin[static_cast<std::size_t>(row) + 1]; ++k) {
+    const auto first = begin[static_cast<std::size_t>(row)], last = begin[static_cast<std::size_t>(row) + 1];
+    if (first > last || last > begin.back()) fail("has broken row limits");
+    for (auto k = first; k < last; ++k) {
       const auto column = index[static_cast<std::size_t>(k)];
       if (column < 0 || column >= columns) fail("has a column out of range");
+      if (!std::isfinite(values[static_cast<std::size_t>(k)])) fail("has a number that is not finite");
       triplets.emplace_back(static_cast<int>(row), column, values[static_cast<std::size_t>(k)]);
     }
   }
@@ -84,13 +94,32 @@ ShellPga pgaFrom(const TensorFile& tensors, int path_steps, Eigen::Index coarse_
   pga.mean = tensors.matrix<double>("mean", coarse_vertices, 3);
   const auto values = tensors.values<double>("eigenvalues");
   pga.eigenvalues = Eigen::Map<const Eigen::VectorXd>(values.data(), static_cast<Eigen::Index>(values.size()));
+  // Before the eigenvectors: without eigenvalues they could have any number of columns in no bytes.
+  if (pga.eigenvalues.size() < 1 || !pga.eigenvalues.allFinite())
+    throw InvalidInput("eigenvalues", "are none or not finite");
   pga.eigenvectors = tensors.matrix<double>("eigenvectors", pga.eigenvalues.size(), -1);
-  pga.path_steps = path_steps;
   const auto modes = pga.eigenvectors.cols();
+  if (modes < 1 || modes > pga.eigenvalues.size() || !pga.eigenvectors.allFinite())
+    throw InvalidInput("eigenvectors", "are none, more than the eigenvalues or not finite");
+  pga.path_steps = path_steps;
   const auto stacked = tensors.matrix<double>("variations", 2 * modes * coarse_vertices, 3);
   for (Eigen::Index j = 0; j < 2 * modes; ++j)
     pga.variations.push_back(stacked.middleRows(j * coarse_vertices, coarse_vertices));
   return pga;
+}
+
+double bendingFrom(const nlohmann::json& description) {
+  const double bending = description.at("bending").get<double>();
+  if (!(bending > 0)) throw InvalidInput("bending", "must be positive");
+  return bending;
+}
+
+/// What solvers take for granted of the shapes on the coarse mesh.
+void requireCoarseShapes(const Topology& coarse, const ShellPga& pga) {
+  requireOneComponent(coarse, "coarse.faces");
+  requireValidShape(coarse, pga.mean, "mean");
+  for (std::size_t j = 0; j < pga.variations.size(); ++j)
+    requireValidShape(coarse, pga.variations[j], "variations[" + std::to_string(j) + "]");
 }
 
 ShellPgaParts partsFrom(const StoredModel& stored) {
@@ -101,6 +130,7 @@ ShellPgaParts partsFrom(const StoredModel& stored) {
   const auto vertex_count = parts.template_shape.rows();
   parts.topology = std::make_shared<Topology>(static_cast<std::int32_t>(vertex_count),
                                               Faces(tensors.matrix<std::int32_t>("faces", -1, 3)));
+  requireValidShape(*parts.topology, parts.template_shape, "template");
   parts.reference = tensors.matrix<double>("reference", vertex_count, 3);
   const auto kept = tensors.values<std::int32_t>("coarse.kept");
   parts.coarsening.kept.assign(kept.begin(), kept.end());
@@ -110,10 +140,12 @@ ShellPgaParts partsFrom(const StoredModel& stored) {
     if (vertex < 0 || vertex >= vertex_count) throw InvalidInput("coarse.kept", "names a vertex out of range");
   const auto coarse_vertices = static_cast<Eigen::Index>(kept.size());
   parts.detail = sparseFrom(tensors, "detail", vertex_count, 2 * coarse_vertices);
-  parts.bending = description.at("bending").get<double>();
+  parts.bending = bendingFrom(description);
   parts.symmetry = symmetryFrom(description);
-  parts.pga = pgaFrom(tensors, description.at("path_steps").get<int>(), coarse_vertices);
-  parts.training.shapes = description.at("training_shapes").get<int>();
+  const auto path_steps = requireWholeNumber(description, "path_steps", 1, kMostPathSteps);
+  parts.pga = pgaFrom(tensors, static_cast<int>(path_steps), coarse_vertices);
+  requireCoarseShapes(*parts.coarsening.coarse, parts.pga);
+  parts.training.shapes = countIn(description, "training_shapes", 0);
   parts.training.mean = outcomeFrom(description.at("training").at("mean"));
   parts.training.variations = outcomeFrom(description.at("training").at("variations"));
   parts.training.seconds = description.at("training").at("seconds").get<double>();
@@ -170,7 +202,9 @@ ShellPgaModelPtr loadShellPga(const StoredModel& stored) {
     throw FileError(version, "has format version " + std::to_string(stored.manifest.format_version) + ", want " +
                                  std::to_string(kFormatVersion) + "; train it again or use the daemon that wrote it");
   try {
-    return std::make_shared<const ShellPgaModel>(partsFrom(stored));
+    auto model = std::make_shared<const ShellPgaModel>(partsFrom(stored));
+    if (!model->mean().allFinite()) throw InvalidInput("mean", "cannot be carried to full resolution");
+    return model;
   } catch (const InvalidInput& problem) {
     throw FileError(version, std::string("cannot be used: ") + problem.what());
   } catch (const nlohmann::json::exception& problem) {

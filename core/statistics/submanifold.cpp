@@ -213,11 +213,13 @@ Solved<SubmanifoldProjection> Submanifold::project(const Vertices& shape, const 
 
 Solved<Vertices> Submanifold::rescale(const Vertices& local, double scale, const SubmanifoldOptions& options) const {
   // Far from the mean (23) may have no solution for steps as long as a K-th of the way; then shorter ones.
+  constexpr int most_steps = 4096;  // further out nobody waits for the answer that there is none
   int spent = 0;
   for (int steps = pga_->path_steps;; steps *= 2) {
     auto marched = march(local, scale, steps, options);
     spent += marched.iterations;
-    if (marched.converged() || marched.termination == Termination::kCancelled || scale * steps > 1) {
+    if (marched.converged() || marched.termination == Termination::kCancelled || scale * steps > 1 ||
+        steps > most_steps) {
       marched.iterations = spent;
       return marched;
     }

@@ -1,5 +1,8 @@
 #include "server/convert/model.h"
 
+#include <limits>
+
+#include "core/io/json_fields.h"
 #include "core/numerics/error.h"
 #include "server/convert/report.h"
 #include "server/convert/time.h"
@@ -21,6 +24,23 @@ v1::ModelState stateOf(ModelState state) {
       return v1::MODEL_STATE_FAILED;
   }
   return v1::MODEL_STATE_UNSPECIFIED;
+}
+
+// Fields of a manifest's description, empty or 0 where they are missing or of another type: whoever loads the model
+// says what is wrong with it, the list of all models must not fail.
+std::string textIn(const nlohmann::json& description, const char* field) {
+  const auto found = description.find(field);
+  return found != description.end() && found->is_string() ? found->get<std::string>() : "";
+}
+
+double numberIn(const nlohmann::json& description, const char* field) {
+  const auto found = description.find(field);
+  return found != description.end() && found->is_number() ? found->get<double>() : 0;
+}
+
+std::uint32_t countIn(const nlohmann::json& description, const char* field) {
+  constexpr std::int64_t most = std::numeric_limits<std::uint32_t>::max();
+  return static_cast<std::uint32_t>(wholeNumber(description, field, 0, most).value_or(0));
 }
 
 void setIdentity(const std::string& name, std::uint64_t version, const ModelManifest& manifest,
@@ -47,16 +67,16 @@ void toProto(const ModelStore::Standing& standing, v1::ModelDescription& descrip
 void toProto(const ModelStore::Entry& entry, v1::ModelDescription& description) {
   setIdentity(entry.name, entry.version, entry.manifest, description);
   const auto& json = entry.manifest.description;
-  description.set_topology_id(json.value("topology", ""));
-  description.set_vertex_count(json.value("vertices", 0U));
-  description.set_face_count(json.value("faces", 0U));
+  description.set_topology_id(textIn(json, "topology"));
+  description.set_vertex_count(countIn(json, "vertices"));
+  description.set_face_count(countIn(json, "faces"));
   auto& pga = *description.mutable_shell_pga();
-  pga.set_training_shapes(json.value("training_shapes", 0U));
-  pga.set_modes(json.value("modes", 0U));
-  pga.set_path_steps(json.value("path_steps", 0U));
-  pga.set_coarse_vertices(json.value("coarse_vertices", 0U));
-  pga.set_bending(json.value("bending", 0.0));
-  pga.set_path_energy(pathEnergyOf(json.value("path_energy", "") == "symmetric"));
+  pga.set_training_shapes(countIn(json, "training_shapes"));
+  pga.set_modes(countIn(json, "modes"));
+  pga.set_path_steps(countIn(json, "path_steps"));
+  pga.set_coarse_vertices(countIn(json, "coarse_vertices"));
+  pga.set_bending(numberIn(json, "bending"));
+  pga.set_path_energy(pathEnergyOf(textIn(json, "path_energy") == "symmetric"));
   description.set_state(stateOf(entry.state));
   description.set_memory_bytes(entry.bytes);
   toProto(entry.standing, description);

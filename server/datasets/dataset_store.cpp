@@ -1,9 +1,12 @@
 #include "server/datasets/dataset_store.h"
 
+#include <limits>
 #include <nlohmann/json.hpp>
 
 #include "core/io/file.h"
+#include "core/io/json_fields.h"
 #include "core/io/npy.h"
+#include "core/io/text_scanner.h"
 #include "core/numerics/error.h"
 #include "server/datasets/name.h"
 #include "server/errors/errors.h"
@@ -14,7 +17,8 @@ namespace {
 namespace fs = std::filesystem;
 
 constexpr char kFrames[] = "frames.npy", kFaces[] = "faces.npy", kInfo[] = "dataset.json", kTemplate[] = "template.npy";
-constexpr char kScratchPrefix[] = ".scratch-";  // no dataset's name begins with a dot
+constexpr std::int64_t kLatest = 9'000'000'000;  // seconds since 1970 that the clock's nanoseconds can hold
+constexpr char kScratchPrefix[] = ".scratch-";   // no dataset's name begins with a dot
 
 void writeInfo(const fs::path& folder, const DatasetInfo& info) {
   const nlohmann::json document{
@@ -27,14 +31,20 @@ void writeInfo(const fs::path& folder, const DatasetInfo& info) {
   writeFile(folder / kInfo, document.dump(2) + "\n");
 }
 
+/// Throws what says that this is no dataset's folder.
 DatasetInfo readInfo(const fs::path& folder) {
-  const auto document = nlohmann::json::parse(readFile(folder / kInfo));
-  return {document.at("name"),
-          document.at("frames"),
-          document.at("vertices"),
-          document.at("faces"),
-          document.at("topology_id"),
-          std::chrono::system_clock::time_point(std::chrono::seconds(document.at("created").get<std::int64_t>()))};
+  using Index = std::numeric_limits<std::int32_t>;
+  const auto path = folder / kInfo;
+  const auto document = parseJson(path.string(), readFile(path));
+  const DatasetInfo info{
+      document.at("name"),
+      requireWholeNumber(document, "frames", 1, std::numeric_limits<std::uint32_t>::max()),
+      static_cast<std::int32_t>(requireWholeNumber(document, "vertices", 3, Index::max())),
+      requireWholeNumber(document, "faces", 1, Index::max()),
+      document.at("topology_id"),
+      std::chrono::system_clock::time_point(std::chrono::seconds(requireWholeNumber(document, "created", 0, kLatest)))};
+  if (info.name != folder.filename()) throw InvalidInput(path.string(), "describes a dataset of another name");
+  return info;
 }
 
 void writeFaces(const fs::path& folder, const Faces& faces) {
@@ -45,6 +55,9 @@ void writeFaces(const fs::path& folder, const Faces& faces) {
 Faces readFaces(const fs::path& folder) {
   constexpr std::int64_t any_by_three[] = {-1, 3};
   const auto array = readNpy(folder / kFaces, any_by_three);
+  for (const double index : array.values)
+    if (!(index >= 0 && index <= std::numeric_limits<std::int32_t>::max()))
+      throw InvalidInput((folder / kFaces).string(), "holds " + shortest(index) + ", which is no vertex");
   using Stored = Eigen::Matrix<double, Eigen::Dynamic, 3, Eigen::RowMajor>;
   return Eigen::Map<const Stored>(array.values.data(), array.shape[0], 3).cast<std::int32_t>();
 }

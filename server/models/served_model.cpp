@@ -1,10 +1,13 @@
 #include "server/models/served_model.h"
 
+#include "core/io/json_fields.h"
+
 namespace shaped::server {
 namespace {
 
 constexpr const char* kDataset = "dataset";
-constexpr const char* kCreated = "created";  // seconds since 1970
+constexpr const char* kCreated = "created";      // seconds since 1970
+constexpr std::int64_t kLatest = 9'000'000'000;  // of them: what the clock's nanoseconds can hold
 
 }  // namespace
 
@@ -17,8 +20,10 @@ Provenance provenanceOf(const ModelManifest& manifest) {
   // Models from elsewhere have none.
   const auto found = manifest.description.find("provenance");
   if (found == manifest.description.end() || !found->is_object()) return {};
-  return {found->value(kDataset, ""),
-          std::chrono::system_clock::time_point(std::chrono::seconds(found->value(kCreated, std::int64_t{0})))};
+  const auto dataset = found->find(kDataset);
+  const auto created = wholeNumber(*found, kCreated, 0, kLatest).value_or(0);
+  return {dataset != found->end() && dataset->is_string() ? dataset->get<std::string>() : "",
+          std::chrono::system_clock::time_point(std::chrono::seconds(created))};
 }
 
 }  // namespace shaped::server

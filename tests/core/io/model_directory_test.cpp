@@ -155,6 +155,9 @@ TEST_CASE("a damaged model is refused and names its file") {
   CHECK_THROWS_WITH(store.manifest("body"), Contains("manifest.json: is no model manifest"));
   writeFile(manifest, "{\"kind\": 3}");
   CHECK_THROWS_WITH(store.manifest("body"), Contains("manifest.json: is no model manifest"));
+  const std::string deep(100000, '[');
+  writeFile(manifest, "{\"description\": " + deep + std::string(100000, ']') + "}");
+  CHECK_THROWS_WITH(store.manifest("body"), Contains("nests deeper than 100 levels"));
   std::filesystem::remove(manifest);
   CHECK_THROWS_WITH(store.manifest("body"), Contains("manifest.json: is no model manifest"));
 }

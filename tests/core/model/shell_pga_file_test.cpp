@@ -66,6 +66,21 @@ TEST_CASE("a model whose training ended without a finite residual can be loaded 
   CHECK(!std::isfinite(loaded->parts().training.mean.residual));
 }
 
+TEST_CASE("a model whose numbers make no shapes is refused by the tensor at fault") {
+  const auto refused = [](const std::function<void(ShellPgaParts&)>& change, const std::string& reason) {
+    auto parts = tubeModel()->parts();
+    change(parts);
+    CHECK_THROWS_AS(throughFile(ShellPgaModel(parts)), FileError);
+    CHECK_THROWS_WITH(throughFile(ShellPgaModel(parts)),
+                      Catch::Contains("model m version 1") && Catch::Contains(reason));
+  };
+  constexpr double nan = std::numeric_limits<double>::quiet_NaN();
+  refused([](ShellPgaParts& parts) { parts.template_shape(3, 1) = nan; }, "template: vertex 3");
+  refused([](ShellPgaParts& parts) { parts.pga.variations[1].setZero(); }, "variations[1]: face 0 is degenerate");
+  refused([](ShellPgaParts& parts) { parts.pga.eigenvalues[0] = nan; }, "eigenvalues");
+  refused([](ShellPgaParts& parts) { parts.pga.eigenvectors(1, 0) = nan; }, "eigenvectors");
+}
+
 TEST_CASE("files of another kind or version, and faulty descriptions, are refused by name") {
   const TemporaryFolder folder;
   const ModelDirectory directory(folder.path());
@@ -80,5 +95,8 @@ TEST_CASE("files of another kind or version, and faulty descriptions, are refuse
   refused([](StoredModel& m) { m.manifest.kind = "linear"; }, "linear");
   refused([](StoredModel& m) { m.manifest.format_version = 99; }, "format version 99");
   refused([](StoredModel& m) { m.manifest.description.erase("bending"); }, "bending");
-  refused([](StoredModel& m) { m.manifest.description["path_steps"] = "four"; }, "description");
+  refused([](StoredModel& m) { m.manifest.description["path_steps"] = "four"; }, "path_steps: must be a whole number");
+  refused([](StoredModel& m) { m.manifest.description["path_steps"] = 0; }, "path_steps");
+  refused([](StoredModel& m) { m.manifest.description["training_shapes"] = 1e300; }, "training_shapes");
+  refused([](StoredModel& m) { m.manifest.description["bending"] = -1; }, "bending: must be positive");
 }

@@ -113,3 +113,10 @@ TEST_CASE("tasks stop when told to") {
   CHECK(edit(model, handles, {.modes = 0, .outer_iterations = 5, .stop = stop.get_token()}).termination ==
         Termination::kCancelled);
 }
+
+TEST_CASE("a point absurdly far from the mean ends without a solution") {
+  SubmanifoldPoint point;
+  point.alpha = Eigen::Vector4d(0.25, 0.25, 0.5, 0);
+  point.scale = 1e-30;
+  CHECK_FALSE(synthesize(*tubeModel(), point, {}).converged());
+}

@@ -106,6 +106,23 @@ TEST_CASE("a damaged model is reported by name, and the list leaves a damaged ma
   CHECK(store.list().front().name == "m");
 }
 
+TEST_CASE("a manifest with fields of other types is listed with what it does say") {
+  ModelStore::Entry entry{"m", 1, {}};
+  entry.manifest.kind = "other";
+  entry.manifest.description = {{"vertices", "many"}, {"faces", 80},
+                                {"modes", -1},        {"bending", nlohmann::json::array()},
+                                {"topology", 7},      {"provenance", {{"dataset", 3}, {"created", 9e18}}}};
+  v1::ModelDescription description;
+  toProto(entry, description);
+  CHECK(description.kind() == "other");
+  CHECK(description.vertex_count() == 0);
+  CHECK(description.face_count() == 80);
+  CHECK(description.shell_pga().modes() == 0);
+  CHECK(description.topology_id().empty());
+  CHECK(description.dataset().empty());
+  CHECK_FALSE(description.has_created());
+}
+
 TEST_CASE("list and description agree") {
   const test::TemporaryFolder folder;
   ModelStore store(folder.path());
