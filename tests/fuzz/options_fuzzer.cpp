@@ -1,4 +1,4 @@
-#include "server/daemon/options.h"
+#include "server/daemon/command_line.h"
 
 #include "tests/fuzz/fuzz.h"
 
@@ -21,12 +21,15 @@ std::vector<std::string> wordsOf(std::string_view bytes) {
 }  // namespace
 
 FUZZ_TARGET(options) {
-  const auto parsed = accepted<InvalidInput>([&] { return server::parseOptions(wordsOf(bytes), 3); });
-  if (!parsed || !*parsed) return;
-  const auto& options = **parsed;
+  const auto parsed = accepted<InvalidInput>([&] { return server::parseCommandLine(wordsOf(bytes), 3); });
+  if (!parsed || parsed->action == server::CommandLine::Action::kHelp ||
+      parsed->action == server::CommandLine::Action::kVersion)
+    return;
+  const auto& options = parsed->options;
   require(!options.store.empty(), "there is a store");
   require(options.threads >= 1 && options.threads <= 1024, "threads are in range");
   require(options.longest_call > 0 && options.publish_patience >= 0, "times are in range");
-  require(options.limits.queue_length >= 1 && options.limits.open_streams >= 1, "limits are at least 1");
-  require(options.limits.queue_bytes >= 1 << 20, "the queue holds a megabyte");
+  require(options.admission.queue_length >= 1 && options.admission.open_streams >= 1, "limits are at least 1");
+  require(options.admission.queue_bytes >= 1 << 20, "the queue holds a megabyte");
+  require(!server::describe(options).empty(), "options can be told");
 }

@@ -10,8 +10,8 @@ namespace {
 
 void convertHeader(const v1::UploadDatasetRequest::Header& header) {
   accepted<InvalidInput>([&] { return server::requireName(header.name(), "name"), true; });
-  const auto faces =
-      accepted<InvalidInput>([&] { return server::facesFromProto(header.faces(), header.vertex_count(), "faces"); });
+  const auto faces = accepted<InvalidInput>(
+      [&] { return server::facesFromProto(header.faces(), header.vertex_count(), {}, "faces"); });
   if (!faces) return;
   require(faces->minCoeff() >= 0 && static_cast<std::uint32_t>(faces->maxCoeff()) < header.vertex_count(),
           "corners are vertices");

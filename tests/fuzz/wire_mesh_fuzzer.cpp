@@ -10,7 +10,7 @@ using namespace shaped::fuzz;
 FUZZ_WIRE_TARGET(wire_mesh, shaped::v1::Mesh) {
   const auto message = parsed<v1::Mesh>(bytes);
   if (!message) return;
-  const auto mesh = accepted<InvalidInput>([&] { return server::meshFromProto(*message, "mesh"); });
+  const auto mesh = accepted<InvalidInput>([&] { return server::meshFromProto(*message, {}, "mesh"); });
   if (!mesh) return;
   requireOneComponent(*mesh->topology, "mesh");
   requireValidShape(*mesh->topology, mesh->vertices, "mesh");
