@@ -46,6 +46,7 @@ CommandLine parseCommandLine(const std::vector<std::string>& words, int default_
       continue;
     }
     auto option = optionAt(words, i);
+    if (option.name == kConfig && option.value.empty()) throw InvalidInput(option.where, "wants a file");
     if (option.name == kConfig)
       command.config = std::filesystem::absolute(option.value);
     else

@@ -135,7 +135,8 @@ const std::vector<OptionSpec>& optionSpecs() {
 void setOptions(const std::vector<GivenOption>& given, DaemonOptions& options) {
   const auto& specs = optionSpecs();
   for (const auto& [where, name, value] : given) {
-    const auto spec = std::find_if(specs.begin(), specs.end(), [&name = name](const auto& one) { return one.name == name; });
+    const auto spec =
+        std::find_if(specs.begin(), specs.end(), [&name = name](const auto& one) { return one.name == name; });
     if (spec == specs.end()) throw InvalidInput(where, "is no option of shaped; see shaped --help");
     spec->set(options, where, value);
   }

@@ -67,6 +67,10 @@ TEST_CASE("every option shows its value as it would be given") {
   }
 }
 
+TEST_CASE("a configuration file without a name is refused") {
+  CHECK_THROWS_WITH(parse({"--config="}), Contains("--config: wants a file"));
+}
+
 TEST_CASE("the command line overrides the configuration file") {
   const test::TemporaryFolder folder;
   writeFile(folder / "shaped.yaml", "store: /srv\nthreads: 5\ndrain: 2.5\n");
