@@ -107,7 +107,7 @@ TEST_CASE("a damaged model is reported by name, and the list leaves a damaged ma
 }
 
 TEST_CASE("a manifest with fields of other types is listed with what it does say") {
-  ModelStore::Entry entry{"m", 1, {}};
+  ModelStore::Entry entry{"m", 1, {}, ModelState::kStored, 0, {}};
   entry.manifest.kind = "other";
   entry.manifest.description = {{"vertices", "many"}, {"faces", 80},
                                 {"modes", -1},        {"bending", nlohmann::json::array()},
