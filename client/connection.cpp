@@ -3,11 +3,73 @@
 #include <grpcpp/create_channel.h>
 #include <grpcpp/security/credentials.h>
 #include <grpcpp/support/channel_arguments.h>
+#include <grpcpp/support/client_interceptor.h>
+
+#include "core/io/file.h"
+#include "core/numerics/error.h"
 
 #include "google/rpc/error_details.pb.h"
 #include "google/rpc/status.pb.h"
 
 namespace shaped::client {
+
+namespace {
+
+grpc::SslCredentialsOptions pemTexts(const ConnectionOptions& options) {
+  if (options.certificate.empty() != options.key.empty())
+    throw InvalidInput(options.key.empty() ? "--key" : "--cert", "is missing: certificate and key come together");
+  const auto read = [](const auto& path) { return path.empty() ? std::string() : readFile(path); };
+  return {.pem_root_certs = read(options.ca),
+          .pem_private_key = read(options.key),
+          .pem_cert_chain = read(options.certificate)};
+}
+
+std::shared_ptr<grpc::ChannelCredentials> tlsCredentials(const ConnectionOptions& options) {
+  return grpc::SslCredentials(pemTexts(options));
+}
+
+/// Whether what is sent there does not leave this machine.
+bool staysHere(const std::string& server) {
+  for (const auto* host : {"localhost:", "[::1]:", "unix:", "unix-abstract:"})
+    if (server.starts_with(host)) return true;
+  // Numbers only: 127.example.org is somewhere else.
+  return server.starts_with("127.") && server.find_first_not_of("0123456789.:") == std::string::npos;
+}
+
+/// Adds the token to a call. gRPC's own call credentials do so over TLS only; the loopback needs none.
+class TokenBearer final : public grpc::experimental::Interceptor {
+ public:
+  explicit TokenBearer(const std::string& token) : authorization_("Bearer " + token) {}
+
+  void Intercept(grpc::experimental::InterceptorBatchMethods* batch) override {
+    if (batch->QueryInterceptionHookPoint(grpc::experimental::InterceptionHookPoints::PRE_SEND_INITIAL_METADATA))
+      batch->GetSendInitialMetadata()->emplace("authorization", authorization_);
+    batch->Proceed();
+  }
+
+ private:
+  const std::string authorization_;
+};
+
+class TokenBearerFactory final : public grpc::experimental::ClientInterceptorFactoryInterface {
+ public:
+  explicit TokenBearerFactory(std::string token) : token_(std::move(token)) {}
+  grpc::experimental::Interceptor* CreateClientInterceptor(grpc::experimental::ClientRpcInfo*) override {
+    return new TokenBearer(token_);
+  }
+
+ private:
+  const std::string token_;
+};
+
+std::vector<std::unique_ptr<grpc::experimental::ClientInterceptorFactoryInterface>> tokenBearers(
+    const std::string& token) {
+  std::vector<std::unique_ptr<grpc::experimental::ClientInterceptorFactoryInterface>> factories;
+  factories.push_back(std::make_unique<TokenBearerFactory>(token));
+  return factories;
+}
+
+}  // namespace
 
 RpcError::RpcError(const grpc::Status& status)
     : std::runtime_error(status.error_message()), code_(status.error_code()) {
@@ -29,12 +91,18 @@ void require(const grpc::Status& status) {
   if (!status.ok()) throw RpcError(status);
 }
 
-std::shared_ptr<grpc::Channel> connect(const std::string& server) {
+std::shared_ptr<grpc::Channel> connect(const ConnectionOptions& options) {
   grpc::ChannelArguments arguments;
   // The daemon has the limits (Server.GetLimits) and says so when a message is too large.
   arguments.SetMaxReceiveMessageSize(-1);
   arguments.SetMaxSendMessageSize(-1);
-  return grpc::CreateCustomChannel(server, grpc::InsecureChannelCredentials(), arguments);
+  const auto credentials = options.encrypted() ? tlsCredentials(options) : grpc::InsecureChannelCredentials();
+  if (options.token.empty()) return grpc::CreateCustomChannel(options.server, credentials, arguments);
+  if (!options.encrypted() && !staysHere(options.server))
+    throw InvalidInput("token", "would travel to " + options.server +
+                                    " in the clear, for everybody on the way to read; use TLS (--tls, --ca)");
+  return grpc::experimental::CreateCustomChannelWithInterceptors(options.server, credentials, arguments,
+                                                                 tokenBearers(options.token));
 }
 
 Call::Call(const CallOptions& options) : on_stop_(options.stop, [this] { context_.TryCancel(); }) {

@@ -5,6 +5,7 @@
 #include <grpcpp/support/status.h>
 
 #include <chrono>
+#include <filesystem>
 #include <functional>
 #include <memory>
 #include <optional>
@@ -35,9 +36,21 @@ class RpcError : public std::runtime_error {
 /// Throws RpcError unless the status is OK.
 void require(const grpc::Status& status);
 
-/// Opens a channel to a daemon, "host:port" or any gRPC target; connects on first use. Shared by all stubs of a
-/// program.
-std::shared_ptr<grpc::Channel> connect(const std::string& server);
+/// How to reach a daemon, and as whom.
+struct ConnectionOptions {
+  std::string server;                      ///< "host:port" or any gRPC target
+  bool tls = false;                        ///< the files below ask for it too
+  std::filesystem::path ca;                ///< PEM: whom to trust; empty: the authorities that the system trusts
+  std::filesystem::path certificate, key;  ///< PEM: the client's own, both or neither
+  std::string token;                       ///< goes with every call; empty: none
+
+  bool encrypted() const { return tls || !ca.empty() || !certificate.empty() || !key.empty(); }
+};
+
+/// Opens a channel to a daemon; connects on first use. Shared by all stubs of a program. Throws InvalidInput naming the
+/// file that cannot be read or the option that is missing, and rather than send a token in the clear to another
+/// machine.
+std::shared_ptr<grpc::Channel> connect(const ConnectionOptions& options);
 
 /// How long calls may take and what aborts them.
 struct CallOptions {

@@ -5,7 +5,9 @@
 #include "core/numerics/threads.h"
 #include "server/daemon/command_line.h"
 #include "server/daemon/daemon.h"
+#include "server/daemon/grpc_log.h"
 #include "server/daemon/signals.h"
+#include "server/security/limits.h"
 #include "server/telemetry/call_log.h"
 
 namespace {
@@ -26,6 +28,7 @@ void reload(server::Daemon& daemon, const std::vector<std::string>& words) try {
 
 int serve(const server::DaemonOptions& options, const std::vector<std::string>& words) {
   server::startLog(options.log);
+  server::takeGrpcLog();
   server::Daemon daemon(options);
   server::logInfo("listening on " + daemon.address() + ", store " + options.store.string() + ", " +
                   std::to_string(options.threads) + " threads");
@@ -61,6 +64,7 @@ int run(const std::vector<std::string>& words) {
 int main(int argc, char** argv) {
   server::catchSignals();
   limitLibraryThreads();
+  server::raiseDescriptorLimit();
   try {
     return run({argv + 1, argv + argc});
   } catch (const InvalidInput& error) {

@@ -4,6 +4,7 @@
 #include <iostream>
 
 #include "client/shapectl/failure.h"
+#include "client/shapectl/token_source.h"
 
 namespace shaped::shapectl {
 namespace {
@@ -11,7 +12,7 @@ namespace {
 constexpr char kFooter[] =
     "Exit codes: 0 success, 1 internal error, 2 bad input, 3 not found, 4 daemon unavailable or busy, 5 deadline "
     "exceeded, "
-    "6 cancelled, 7 written but not converged.";
+    "6 cancelled, 7 written but not converged, 8 denied: no valid token or certificate, or not the role.";
 
 /// Arguments of one verb on a CLI11 subcommand.
 class CliArguments : public Arguments {
@@ -61,8 +62,21 @@ class CliArguments : public Arguments {
   CLI::Option* last_ = nullptr;
 };
 
+void declareConnection(CLI::App& app, client::ConnectionOptions& connection, std::string& token_file) {
+  app.add_option("--server", connection.server, "The daemon, host:port")
+      ->envname("SHAPED_SERVER")
+      ->capture_default_str();
+  app.add_flag("--tls", connection.tls, "Connect over TLS; --ca and --cert imply it")->envname("SHAPED_TLS");
+  app.add_option("--ca", connection.ca, "Trust daemons of these authorities (PEM), not the system's")
+      ->envname("SHAPED_CA");
+  app.add_option("--cert", connection.certificate, "Certificate to show to the daemon (PEM), with --key")
+      ->envname("SHAPED_CERT");
+  app.add_option("--key", connection.key, "Its private key (PEM)")->envname("SHAPED_KEY");
+  app.add_option("--token-file", token_file, "File that holds the token to call with; or SHAPED_TOKEN holds it")
+      ->envname("SHAPED_TOKEN_FILE");
+}
+
 void declareGlobals(CLI::App& app, Session& session, std::string& output) {
-  app.add_option("--server", session.server, "The daemon, host:port")->envname("SHAPED_SERVER")->capture_default_str();
   app.add_option("--output", output, "text or json")->check(CLI::IsMember({"text", "json"}))->capture_default_str();
   app.add_option("--timeout", session.timeout, "Longest time of a call [s]")->check(CLI::PositiveNumber);
 }
@@ -77,8 +91,10 @@ int parseFailure(const CLI::App& app, const CLI::ParseError& error) {
 int runCommandLine(int argc, char** argv, const std::vector<Verb>& verbs, std::stop_token stop) {
   CLI::App app("shapectl: shape models at the terminal, served by shaped");
   app.footer(kFooter);
-  Session session{.server = "127.0.0.1:50051", .json = false, .timeout = {}, .stop = std::move(stop)};
-  std::string output = "text";
+  Session session{.connection = {}, .json = false, .timeout = {}, .stop = std::move(stop)};
+  session.connection.server = "127.0.0.1:50051";
+  std::string output = "text", token_file;
+  declareConnection(app, session.connection, token_file);
   declareGlobals(app, session, output);
   app.require_subcommand(1)->fallthrough();
   for (const auto& verb : verbs) {
@@ -93,7 +109,11 @@ int runCommandLine(int argc, char** argv, const std::vector<Verb>& verbs, std::s
   session.json = output == "json";
   const auto& chosen = app.get_subcommands().front()->get_name();
   for (const auto& verb : verbs)
-    if (verb.name == chosen) return static_cast<int>(reportingFailures(session, [&] { return verb.run(session); }));
+    if (verb.name == chosen)
+      return static_cast<int>(reportingFailures(session, [&] {
+        session.connection.token = tokenOf(token_file);
+        return verb.run(session);
+      }));
   return static_cast<int>(ExitCode::kInternal);
 }
 

@@ -12,6 +12,7 @@ enum class ExitCode {
   kDeadline = 5,      ///< --timeout or the daemon's limit passed
   kCancelled = 6,     ///< Ctrl-C, or a job was cancelled
   kNotConverged = 7,  ///< there is an answer and it was written, but its solver did not converge
+  kDenied = 8,        ///< no token or certificate that the daemon knows, or one without the role
 };
 
 }  // namespace shaped::shapectl

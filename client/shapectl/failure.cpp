@@ -3,6 +3,7 @@
 #include <iostream>
 #include <nlohmann/json.hpp>
 
+#include "client/diagnosis.h"
 #include "core/numerics/error.h"
 
 namespace shaped::shapectl {
@@ -26,6 +27,8 @@ constexpr const char* nameOf(ExitCode code) {
       return "cancelled";
     case ExitCode::kNotConverged:
       return "not_converged";
+    case ExitCode::kDenied:
+      return "denied";
   }
   return "internal";
 }
@@ -52,6 +55,13 @@ ExitCode report(const Session& session, ExitCode code, const std::string& messag
   return code;
 }
 
+std::string unreachable(const Session& session, const client::RpcError& error) {
+  const auto& server = session.connection.server;
+  const auto reason = client::diagnose(session.connection);
+  if (!reason.empty()) return server + ": " + reason;
+  return "no daemon answers at " + server + " (" + error.what() + "); start shaped or name another with --server";
+}
+
 }  // namespace
 
 ExitCode exitCodeOf(grpc::StatusCode code) {
@@ -72,6 +82,9 @@ ExitCode exitCodeOf(grpc::StatusCode code) {
       return ExitCode::kDeadline;
     case grpc::CANCELLED:
       return ExitCode::kCancelled;
+    case grpc::UNAUTHENTICATED:
+    case grpc::PERMISSION_DENIED:
+      return ExitCode::kDenied;
     default:
       return ExitCode::kInternal;
   }
@@ -85,11 +98,7 @@ ExitCode reportingFailures(const Session& session, const std::function<ExitCode(
   } catch (const client::RpcError& error) {
     if (session.stop.stop_requested()) return report(session, ExitCode::kCancelled, "cancelled");
     const auto code = exitCodeOf(error.code());
-    const bool unreachable = error.code() == grpc::UNAVAILABLE;
-    return report(session, code,
-                  unreachable ? "no daemon answers at " + session.server + " (" + error.what() +
-                                    "); start shaped or name another with --server"
-                              : error.what(),
+    return report(session, code, error.code() == grpc::UNAVAILABLE ? unreachable(session, error) : error.what(),
                   detailsOf(error));
   } catch (const std::exception& error) {
     return report(session, ExitCode::kInternal, error.what());

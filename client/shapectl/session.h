@@ -10,13 +10,13 @@ namespace shaped::shapectl {
 
 /// What all verbs share: the global options, and the token that Ctrl-C fires.
 struct Session {
-  std::string server;             ///< "host:port"
-  bool json = false;              ///< --output json
-  std::optional<double> timeout;  ///< of each call [s]
+  client::ConnectionOptions connection;  ///< --server, and who calls
+  bool json = false;                     ///< --output json
+  std::optional<double> timeout;         ///< of each call [s]
   std::stop_token stop;
 
   /// The channel to the daemon; only verbs that need one call this.
-  std::shared_ptr<grpc::Channel> channel() const { return client::connect(server); }
+  std::shared_ptr<grpc::Channel> channel() const { return client::connect(connection); }
   client::CallOptions callOptions() const {
     client::CallOptions options{.timeout = {}, .stop = stop};
     if (timeout) options.timeout = std::chrono::duration<double>(*timeout);

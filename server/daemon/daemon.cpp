@@ -7,6 +7,7 @@
 #include "core/numerics/error.h"
 #include "server/jobs/arena.h"
 #include "server/rpc/training.h"
+#include "server/security/limits.h"
 #include "server/telemetry/call_log.h"
 
 namespace shaped::server {
@@ -24,6 +25,7 @@ void alone(const std::function<void()>& serve) { runInArena(1, serve); }
 
 Daemon::Daemon(const DaemonOptions& options)
     : options_(options),
+      security_(options.security, options.listen),
       lock_(options.store),
       models_(options.store / "models", options.models),
       datasets_(options.store / "datasets"),
@@ -37,7 +39,9 @@ Daemon::Daemon(const DaemonOptions& options)
                timer_,
                std::chrono::duration<double>(options.longest_call),
                kLongestHeavyCall,
-               options.threads},
+               std::chrono::duration<double>(options.write_patience),
+               options.threads,
+               security_.access()},
       models_service_(runtime_, models_),
       datasets_service_(runtime_, options_.limits, datasets_),
       jobs_service_(runtime_, job_registry_, jobs_,
@@ -54,7 +58,8 @@ void Daemon::listen(const std::string& address) {
   grpc::reflection::InitProtoReflectionServerBuilderPlugin();
   grpc::ServerBuilder builder;
   int port = -1;
-  builder.AddListeningPort(address, grpc::InsecureServerCredentials(), &port);
+  builder.AddListeningPort(address, security_.transport(), &port);
+  limitConnections(builder);
   builder.SetMaxReceiveMessageSize(static_cast<int>(options_.limits.message_bytes));
   builder.SetMaxSendMessageSize(static_cast<int>(options_.limits.message_bytes));
   // Two daemons on one port would share its connections at random.
@@ -83,6 +88,7 @@ void Daemon::reload(const DaemonOptions& options) {
             (spec.while_running ? "" : " in the configuration: from the next start on"));
   }
   useLimits();
+  security_.reload();
   logInfo("configuration read again");
 }
 

@@ -13,6 +13,7 @@
 #include "server/rpc/models_service.h"
 #include "server/rpc/server_service.h"
 #include "server/rpc/shapes_service.h"
+#include "server/security/security.h"
 
 namespace shaped::server {
 
@@ -31,7 +32,8 @@ class Daemon {
   const std::string& address() const { return address_; }
   /// The options in force.
   const DaemonOptions& options() const { return options_; }
-  /// Takes over the options that may change while it runs, and logs what changed and what waits for a restart.
+  /// Takes over the options that may change while it runs, and logs what changed and what waits for a restart. Reads
+  /// certificates and tokens anew: what is wrong with them is logged, and the old ones stay.
   void reload(const DaemonOptions& options);
   /// Health says NOT_SERVING from here on; calls are still answered.
   void announceStop();
@@ -43,6 +45,7 @@ class Daemon {
   void useLimits();
 
   DaemonOptions options_;
+  Security security_;
   const StoreLock lock_;
   ModelStore models_;
   DatasetStore datasets_;

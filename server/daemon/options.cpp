@@ -69,6 +69,19 @@ OptionSpec logLevelOption() {
   return option;
 }
 
+/// The address once more: this way of giving it is the consent to an open network.
+OptionSpec listenInsecurelyOption() {
+  return {"listen-insecurely",
+          "HOST:PORT",
+          "as --listen, but without TLS on any address: where the network itself is secured",
+          false,
+          [](DaemonOptions& options, const std::string&, const std::string& value) {
+            options.security.anywhere = !value.empty();
+            if (!value.empty()) options.listen = value;
+          },
+          [](const DaemonOptions& options) { return options.security.anywhere ? options.listen : std::string(); }};
+}
+
 constexpr std::int64_t kMostCount = 1 << 20;
 constexpr double kMostSeconds = 1e6;
 constexpr std::int64_t kMostVertices = 100'000'000;
@@ -88,6 +101,9 @@ std::vector<OptionSpec> makeSpecs() {
           "longest-call", "S", When::kWhileRunning, 0.001, kMostSeconds,
           [](auto& o) -> auto& { return o.longest_call; },
           "cap on a call, and on a stream's time between messages [s]"),
+      numberOption(
+          "write-patience", "S", When::kAtStart, 0.001, kMostSeconds, [](auto& o) -> auto& { return o.write_patience; },
+          "how long a stream waits for a client that takes no more [s]"),
       numberOption(
           "publish-patience", "S", When::kAtStart, 0, kMostSeconds, [](auto& o) -> auto& { return o.publish_patience; },
           "how long a trained model waits for room on a full disk [s]"),
@@ -122,6 +138,19 @@ std::vector<OptionSpec> makeSpecs() {
           "max-message-megabytes", "N", When::kAtStart, 1024, [](auto& o) -> auto& { return o.limits.message_bytes; },
           "largest message, either way [MiB]", 1 << 20),
       logLevelOption(),
+      textOption(
+          "tls-cert", "FILE", When::kAtStart, [](auto& o) -> auto& { return o.security.certificates.chain; },
+          "certificate chain of the daemon, PEM; with tls-key: serve over TLS. Without, on the loopback only"),
+      textOption(
+          "tls-key", "FILE", When::kAtStart, [](auto& o) -> auto& { return o.security.certificates.key; },
+          "its private key, PEM"),
+      textOption(
+          "tls-client-ca", "FILE", When::kAtStart, [](auto& o) -> auto& { return o.security.certificates.client_ca; },
+          "serve only clients with a certificate of these authorities, PEM"),
+      textOption(
+          "tokens", "FILE", When::kAtStart, [](auto& o) -> auto& { return o.security.tokens; },
+          "serve only clients that this file knows, each as far as its roles allow"),
+      listenInsecurelyOption(),
   };
 }
 

@@ -8,6 +8,7 @@
 #include "server/convert/limits.h"
 #include "server/models/model_store.h"
 #include "server/scheduling/admission.h"
+#include "server/security/security.h"
 
 namespace shaped::server {
 
@@ -19,7 +20,9 @@ struct DaemonOptions {
   double publish_patience = 300;           ///< how long a trained model waits for room on a full disk [s], >= 0
   double drain = 0;                        ///< asked to stop: how long it still answers, NOT_SERVING [s], >= 0
   double grace = 5;                        ///< then: how long running calls may go on [s], >= 0
+  double write_patience = 60;              ///< how long a stream waits for a client to take a message [s], > 0
   AdmissionLimits admission;
+  SecurityOptions security;
   Limits limits;  ///< of requests
   ModelStoreOptions models;
   std::string log = "info";  ///< debug, info, warn, error

@@ -18,7 +18,10 @@ ErrorReport stoppedReport(StopReason reason) {
   if (reason == StopReason::kDeadline)
     return {
         grpc::DEADLINE_EXCEEDED, "the deadline passed before there was an answer", Reason::kDeadlineExceeded, {}, {}};
-  return {grpc::CANCELLED, "cancelled by the client", Reason::kCancelled, {}, {}};
+  const auto text = reason == StopReason::kReader
+                        ? "given up: the client did not take the stream's messages (--write-patience)"
+                        : "cancelled by the client";
+  return {grpc::CANCELLED, text, Reason::kCancelled, {}, {}};
 }
 
 ErrorReport fileReport(const std::string& text) {
@@ -91,6 +94,10 @@ std::string nameOf(grpc::StatusCode code) {
       return "NOT_FOUND";
     case grpc::ALREADY_EXISTS:
       return "ALREADY_EXISTS";
+    case grpc::PERMISSION_DENIED:
+      return "PERMISSION_DENIED";
+    case grpc::UNAUTHENTICATED:
+      return "UNAUTHENTICATED";
     case grpc::RESOURCE_EXHAUSTED:
       return "RESOURCE_EXHAUSTED";
     case grpc::FAILED_PRECONDITION:

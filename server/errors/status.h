@@ -22,7 +22,7 @@ namespace shaped::server {
 ///   anything else -> INTERNAL
 grpc::Status statusOf(const std::exception_ptr& error, StopReason stopped);
 
-/// The client went away: CANCELLED; time is up: DEADLINE_EXCEEDED.
+/// The client went away or reads nothing: CANCELLED; time is up: DEADLINE_EXCEEDED.
 grpc::Status stoppedStatus(StopReason reason);
 
 /// Whether a FileError's text gives a full disk, quota or size limit as the system's reason.

@@ -1,5 +1,7 @@
 #include "server/rpc/call.h"
 
+#include <grpc/grpc_security_constants.h>
+
 #include <algorithm>
 
 #include "server/errors/errors.h"
@@ -18,12 +20,26 @@ double secondsSince(std::chrono::steady_clock::time_point begin) {
   return std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count();
 }
 
+/// For the log only: before the call came here, server/security/transport.cpp let it through by the same credentials.
+Credentials credentialsOf(const grpc::CallbackServerContext& context) {
+  Credentials credentials;
+  const auto& metadata = context.client_metadata();
+  if (const auto found = metadata.find("authorization"); found != metadata.end())
+    credentials.authorization = {found->second.data(), found->second.size()};
+  if (const auto peer = context.auth_context())
+    for (const auto& name : peer->FindPropertyValues(GRPC_X509_CN_PROPERTY_NAME))
+      credentials.common_name = {name.data(), name.size()};
+  return credentials;
+}
+
 }  // namespace
 
-Call::Call(grpc::CallbackServerContext& context, std::string method, std::chrono::duration<double> cap)
+Call::Call(const Runtime& runtime, grpc::CallbackServerContext& context, std::string method,
+           std::chrono::duration<double> cap)
     : context_(context),
       id_(nextRequestId()),
       method_(std::move(method)),
+      client_(runtime.access ? runtime.access->nameOf(credentialsOf(context)) : ""),
       cap_(cap),
       arrival_(std::chrono::steady_clock::now()),
       work_begin_(arrival_) {}
@@ -72,7 +88,8 @@ DeadlineTimer::Clock::time_point Call::deadline() const {
 
 bool Call::finishOnce(const grpc::Status& status) {
   if (finished_.exchange(true)) return false;
-  CallRecord record{id_, method_, {}, nameOf(status.error_code()), status.error_message(), secondsSince(arrival_)};
+  CallRecord record{
+      id_, method_, client_, {}, nameOf(status.error_code()), status.error_message(), secondsSince(arrival_)};
   {
     const std::scoped_lock lock(model_mutex_);
     record.model = model_;

@@ -13,6 +13,7 @@
 #include "server/scheduling/deadline_timer.h"
 #include "server/scheduling/stopper.h"
 #include "server/scheduling/worker_pool.h"
+#include "server/security/access.h"
 
 namespace shaped::server {
 
@@ -25,7 +26,9 @@ struct Runtime {
   std::atomic<std::chrono::duration<double>>
       longest_call;  ///< cap on a call's deadline; for streams, on the time between messages
   std::chrono::duration<double> longest_heavy_call;
-  int threads;  ///< of the arena of one heavy call
+  std::chrono::duration<double> write_patience;  ///< how long a worker waits for a client to take a message
+  int threads;                                   ///< of the arena of one heavy call
+  const Access* access;                          ///< knows the callers; null when nobody is asked who he is
 };
 
 /// What every call has, whatever its shape: an id, a deadline, a stop token, one line in the log.
@@ -34,7 +37,8 @@ struct Runtime {
 class Call {
  public:
   /// cap: the longest that the server works on it, whatever the client's deadline.
-  Call(grpc::CallbackServerContext& context, std::string method, std::chrono::duration<double> cap);
+  Call(const Runtime& runtime, grpc::CallbackServerContext& context, std::string method,
+       std::chrono::duration<double> cap);
 
   std::uint64_t id() const { return id_; }
   /// Fires when the client cancels or goes away, the deadline passes, or the daemon stops. Give it to every solver.
@@ -64,7 +68,7 @@ class Call {
  private:
   grpc::CallbackServerContext& context_;
   const std::uint64_t id_;
-  const std::string method_;
+  const std::string method_, client_;
   const std::chrono::duration<double> cap_;
   const std::chrono::steady_clock::time_point arrival_;
   std::chrono::steady_clock::time_point work_begin_;

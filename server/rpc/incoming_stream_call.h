@@ -39,7 +39,7 @@ class IncomingStreamCall final : public Reactor,
       : runtime_(runtime),
         pool_(pool),
         context_(context),
-        call_(context, std::move(method), runtime.longest_call),
+        call_(runtime, context, std::move(method), runtime.longest_call),
         final_response_(final_response),
         handler_(std::move(handler)) {}
 

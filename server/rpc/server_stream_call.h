@@ -14,7 +14,8 @@
 namespace shaped::server {
 
 /// One request, many answers. A worker runs the handler, which writes as it goes; write() waits until the message is on
-/// its way, so that a slow reader slows the handler down instead of filling memory.
+/// its way, so that a slow reader slows the handler down instead of filling memory; one that takes nothing for
+/// Runtime::write_patience is given up.
 template <class Request, class Response>
 class ServerStreamCall final : public grpc::ServerWriteReactor<Response>,
                                public std::enable_shared_from_this<ServerStreamCall<Request, Response>> {
@@ -29,7 +30,7 @@ class ServerStreamCall final : public grpc::ServerWriteReactor<Response>,
       : runtime_(runtime),
         pool_(pool),
         context_(context),
-        call_(context, std::move(method), runtime.longest_call),
+        call_(runtime, context, std::move(method), runtime.longest_call),
         request_(request),
         handler_(std::move(handler)) {}
 
@@ -76,7 +77,13 @@ class ServerStreamCall final : public grpc::ServerWriteReactor<Response>,
     lock.unlock();
     this->StartWrite(&message_);
     lock.lock();
-    written_.wait(lock, [this] { return !writing_; });
+    const auto taken = [this] { return !writing_; };
+    if (!written_.wait_for(lock, runtime_.write_patience, taken)) {
+      // A worker is worth more than a client who does not read.
+      call_.stop(StopReason::kReader);
+      context_.TryCancel();
+      written_.wait(lock, taken);
+    }
     if (!arrived_) {
       call_.stop(StopReason::kClient);
       call_.throwIfStopped();

@@ -24,7 +24,7 @@ class UnaryCall final : public grpc::ServerUnaryReactor,
             const Request& request, Response& response, Handler handler)
       : runtime_(runtime),
         pool_(pool),
-        call_(context, std::move(method),
+        call_(runtime, context, std::move(method),
               &pool == &runtime.heavy ? runtime.longest_heavy_call : runtime.longest_call.load()),
         request_(request),
         response_(response),

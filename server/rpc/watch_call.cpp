@@ -5,7 +5,7 @@
 namespace shaped::server {
 
 WatchCall::WatchCall(Runtime& runtime, JobRegistry& registry, grpc::CallbackServerContext& context, std::string job)
-    : registry_(registry), call_(context, "Jobs.Watch", runtime.longest_call), job_(std::move(job)) {}
+    : registry_(registry), call_(runtime, context, "Jobs.Watch", runtime.longest_call), job_(std::move(job)) {}
 
 void WatchCall::enter() {
   self_ = shared_from_this();

@@ -5,7 +5,7 @@
 
 namespace shaped::server {
 
-enum class StopReason { kNone, kClient, kDeadline };
+enum class StopReason { kNone, kClient, kDeadline, kReader };
 
 /// A stop source that remembers who pulled it first.
 class Stopper {

@@ -18,6 +18,8 @@ std::string oneLine(std::string text) {
   return text;
 }
 
+std::string orDash(const std::string& text) { return text.empty() ? "-" : oneLine(text); }
+
 }  // namespace
 
 void requireLogLevel(const std::string& level, const std::string& where) {
@@ -44,12 +46,17 @@ void logCall(const CallRecord& record, bool servers_fault) {
   const auto level = record.message.empty() ? spdlog::level::info
                      : servers_fault        ? spdlog::level::err
                                             : spdlog::level::warn;
-  spdlog::log(level, "request={} method={} model={} outcome={} seconds={:.6f}{}{}", record.request_id, record.method,
-              record.model.empty() ? "-" : oneLine(record.model), record.outcome, record.seconds,
+  spdlog::log(level, "request={} method={} client={} model={} outcome={} seconds={:.6f}{}{}", record.request_id,
+              record.method, orDash(record.client), orDash(record.model), record.outcome, record.seconds,
               record.message.empty() ? "" : " message=", oneLine(record.message));
 }
 
+void logRefusal(const std::string& method, const std::string& client, const std::string& reason) {
+  spdlog::warn("refused method={} client={} message={}", orDash(method), orDash(client), oneLine(reason));
+}
+
 void logInfo(const std::string& line) { spdlog::info(oneLine(line)); }
+void logWarning(const std::string& line) { spdlog::warn(oneLine(line)); }
 void logError(const std::string& line) { spdlog::error(oneLine(line)); }
 
 }  // namespace shaped::server

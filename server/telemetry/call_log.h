@@ -9,6 +9,7 @@ namespace shaped::server {
 struct CallRecord {
   std::uint64_t request_id = 0;
   std::string method;   ///< "Shapes.Project"
+  std::string client;   ///< name of the token or certificate; empty where nobody was asked
   std::string model;    ///< "NAME@VERSION"; empty where no model took part
   std::string outcome;  ///< gRPC status name
   std::string message;  ///< of a status that is not OK
@@ -27,8 +28,12 @@ void setLogLevel(const std::string& level);
 /// Writes the record as one line: info when OK, warn for what the client did, error for what the server did.
 void logCall(const CallRecord& record, bool servers_fault);
 
+/// Writes one line about a call that was turned away before it became one. client: as in CallRecord.
+void logRefusal(const std::string& method, const std::string& client, const std::string& reason);
+
 /// One line about the daemon itself.
 void logInfo(const std::string& line);
+void logWarning(const std::string& line);
 void logError(const std::string& line);
 
 }  // namespace shaped::server

@@ -10,7 +10,7 @@ std::vector<Verb> allVerbs() {
       jobsVerb(),    watchVerb(),      cancelVerb(),                   //
       projectVerb(), synthesizeVerb(), interpolateVerb(), editVerb(),  //
       fitVerb(),     scoreVerb(),      evaluateVerb(),                 //
-      sampleVerb(),  renderVerb(),                                     //
+      sampleVerb(),  renderVerb(),     tokenVerb(),                    //
   };
 }
 

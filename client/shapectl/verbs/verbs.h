@@ -26,6 +26,7 @@ Verb scoreVerb();
 Verb evaluateVerb();
 Verb sampleVerb();
 Verb renderVerb();
+Verb tokenVerb();
 
 /// Every verb, in the order of the help.
 std::vector<Verb> allVerbs();
