@@ -16,16 +16,29 @@ const std::map<std::string_view, Role>& names() {
 /// A method that stands here for no one can be called by no one: a new method needs its line.
 const std::map<std::string_view, Role>& methods() {
   static const std::map<std::string_view, Role> table{
-      {"/shaped.v1.Models/List", Role::kRead},        {"/shaped.v1.Models/Get", Role::kRead},
-      {"/shaped.v1.Models/Delete", Role::kAdmin},     {"/shaped.v1.Datasets/List", Role::kRead},
-      {"/shaped.v1.Datasets/Upload", Role::kTrain},   {"/shaped.v1.Datasets/Delete", Role::kTrain},
-      {"/shaped.v1.Jobs/Get", Role::kRead},           {"/shaped.v1.Jobs/List", Role::kRead},
-      {"/shaped.v1.Jobs/Watch", Role::kRead},         {"/shaped.v1.Jobs/Train", Role::kTrain},
-      {"/shaped.v1.Jobs/Cancel", Role::kTrain},       {"/shaped.v1.Server/GetLimits", Role::kRead},
+      {"/shaped.v1.Models/List", Role::kRead},
+      {"/shaped.v1.Models/Get", Role::kRead},
+      {"/shaped.v1.Models/Load", Role::kAdmin},
+      {"/shaped.v1.Models/Unload", Role::kAdmin},
+      {"/shaped.v1.Models/SetLabel", Role::kAdmin},
+      {"/shaped.v1.Models/WaitUntilReady", Role::kRead},
+      {"/shaped.v1.Models/Delete", Role::kAdmin},
+      {"/shaped.v1.Datasets/List", Role::kRead},
+      {"/shaped.v1.Datasets/Upload", Role::kTrain},
+      {"/shaped.v1.Datasets/Delete", Role::kTrain},
+      {"/shaped.v1.Jobs/Get", Role::kRead},
+      {"/shaped.v1.Jobs/List", Role::kRead},
+      {"/shaped.v1.Jobs/Watch", Role::kRead},
+      {"/shaped.v1.Jobs/Train", Role::kTrain},
+      {"/shaped.v1.Jobs/Cancel", Role::kTrain},
+      {"/shaped.v1.Server/GetLimits", Role::kRead},
       {"/shaped.v1.Shapes/Project", Role::kInfer},
-      {"/shaped.v1.Shapes/Synthesize", Role::kInfer}, {"/shaped.v1.Shapes/Interpolate", Role::kInfer},
-      {"/shaped.v1.Shapes/Edit", Role::kInfer},       {"/shaped.v1.Shapes/FitMarkers", Role::kInfer},
-      {"/shaped.v1.Shapes/Score", Role::kInfer},      {"/shaped.v1.Shapes/Evaluate", Role::kInfer},
+      {"/shaped.v1.Shapes/Synthesize", Role::kInfer},
+      {"/shaped.v1.Shapes/Interpolate", Role::kInfer},
+      {"/shaped.v1.Shapes/Edit", Role::kInfer},
+      {"/shaped.v1.Shapes/FitMarkers", Role::kInfer},
+      {"/shaped.v1.Shapes/Score", Role::kInfer},
+      {"/shaped.v1.Shapes/Evaluate", Role::kInfer},
   };
   return table;
 }
