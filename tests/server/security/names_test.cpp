@@ -64,7 +64,7 @@ TEST_CASE("hostile names of models reach no file") {
   const auto before = fixture.entries();
   for (const auto& name : kHostile)
     for (const std::uint64_t version : {std::uint64_t{0}, std::uint64_t{1}, ~std::uint64_t{0}}) {
-      CHECK_THROWS_AS(store.pin(name, version), InvalidInput);
+      CHECK_THROWS_AS(store.pin({name, version, ""}), InvalidInput);
       CHECK_THROWS_AS(store.remove(name, version), InvalidInput);
     }
   const ModelDirectory directory(fixture.folder / "models");
