@@ -66,6 +66,7 @@ class NetworkNewton {
   NodeVectors findDirection(double forcing) const;
   bool step(const NodeVectors& direction);
 
+  const ElasticNetwork& network() const { return network_; }
   ElasticNetwork takeNetwork() { return std::move(network_); }
 
  private:
@@ -292,6 +293,7 @@ Solved<ElasticNetwork> relax(const ShellStructurePtr& structure, const PairEnerg
     if (options.on_iteration) options.on_iteration(outcome.iterations, outcome.residual);
     outcome.termination = Termination::kNumericalFailure;
     if (!std::isfinite(outcome.residual)) break;
+    if (options.on_iterate) options.on_iterate(outcome, run.network());
     outcome.termination = Termination::kConverged;
     if (outcome.residual <= options.tolerance) break;
     outcome.termination = Termination::kIterationLimit;
@@ -308,6 +310,8 @@ Solved<ElasticNetwork> relax(const ShellStructurePtr& structure, const PairEnerg
     outcome.termination = Termination::kStalled;
     if (!run.step(direction)) break;
   }
+  // A step that the stop token interrupted was not taken.
+  if (outcome.termination == Termination::kCancelled && options.on_iterate) options.on_iterate(outcome, run.network());
   auto result = run.takeNetwork();
   if (outcome.termination == Termination::kNumericalFailure) result.nodes = start;
   return {std::move(result), outcome};

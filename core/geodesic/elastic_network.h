@@ -31,6 +31,8 @@ struct NetworkOptions {
   double tolerance = 1e-8;  ///< on the largest relative force imbalance over free nodes, > 0
   std::stop_token stop;
   std::function<void(int iteration, double residual)> on_iteration;  ///< before each step, may be empty
+  /// Sees each iterate before its step, and the last one again when the stop token has fired; may be empty.
+  std::function<void(const Outcome& so_far, const ElasticNetwork& iterate)> on_iterate = {};
 };
 
 /// Descends the network's energy in all free nodes at once by a truncated Newton method.

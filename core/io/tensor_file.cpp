@@ -242,6 +242,7 @@ void TensorWriter::write(const std::function<void(std::string_view)>& sink) cons
   std::stable_sort(ordered.begin(), ordered.end(),
                    [](const Tensor* a, const Tensor* b) { return nameOf(a->type).size > nameOf(b->type).size; });
   json header = json::object();
+  if (!metadata_.empty()) header[kMetadata] = metadata_;
   std::size_t end = 0;
   for (const auto* tensor : ordered) {
     const auto begin = end;

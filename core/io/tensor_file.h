@@ -121,6 +121,9 @@ class TensorWriter {
     add(name, {copy.rows(), copy.cols()}, std::span<const Number>(copy.data(), static_cast<std::size_t>(copy.size())));
   }
 
+  /// Text for the header, read back by TensorFile::metadata(); must be UTF-8.
+  void setMetadata(const std::string& key, const std::string& text) { metadata_[key] = text; }
+
   /// Gives the file's bytes to a sink, piece by piece.
   void write(const std::function<void(std::string_view)>& sink) const;
   /// Writes the file; it appears only when complete. Throws FileError.
@@ -138,6 +141,7 @@ class TensorWriter {
   void addNumbers(const std::string& name, const std::vector<std::int64_t>& shape, std::span<const Number> values);
 
   std::vector<Tensor> tensors_;
+  std::map<std::string, std::string> metadata_;
 };
 
 }  // namespace shaped

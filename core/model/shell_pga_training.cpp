@@ -1,5 +1,7 @@
 #include "core/model/shell_pga_training.h"
 
+#include "core/io/sha256.h"
+#include "core/io/text_scanner.h"
 #include "core/mesh/alignment.h"
 #include "core/mesh/quality.h"
 #include "core/numerics/error.h"
@@ -48,7 +50,48 @@ void report(const ProgressSink& sink, const std::string& stage, double fraction)
   if (sink) sink({stage, fraction, 0});
 }
 
+void hashShape(const Vertices& shape, Sha256& hash) {
+  hash.update({reinterpret_cast<const char*>(shape.data()), static_cast<std::size_t>(shape.size()) * sizeof(double)});
+}
+
+/// The Frechet mean, begun or resumed; counts the Newton steps of all processes together.
+Solved<Spider> trainMean(const GeodesicCalculus& calculus, const std::vector<Vertices>& coarse,
+                         const ShellPgaTrainingOptions& options, ShellPgaCheckpoint& state,
+                         const CheckpointSink& checkpoint, const ProgressSink& progress, const std::stop_token& stop) {
+  if (state.mean_ended) return {*state.spider, state.mean};
+  const int before = state.mean.iterations;
+  const auto soFar = [before](Outcome outcome) { return outcome.iterations += before, outcome; };
+  FrechetMeanOptions mean_options{options.path_steps,
+                                  options.iterations - before,
+                                  options.tolerance,
+                                  stop,
+                                  within(progress, 0.1, 0.75),
+                                  state.spider ? &*state.spider : nullptr,
+                                  {}};
+  if (checkpoint)
+    mean_options.on_iterate = [&](const Outcome& outcome, const std::function<Spider()>& iterate) {
+      checkpoint([&] {
+        return ShellPgaCheckpoint{state.training, state.coarsening, iterate(), soFar(outcome), false};
+      });
+    };
+  auto mean = frechetMean(calculus, coarse, mean_options);
+  return {std::move(mean.solution), soFar(mean)};
+}
+
 }  // namespace
+
+std::string trainingFingerprint(const ShellPgaTrainingSet& set, const ShellPgaTrainingOptions& options) {
+  Sha256 hash;
+  hash.update(set.topology->id());
+  for (const double number :
+       {static_cast<double>(options.modes), static_cast<double>(options.path_steps), options.bending.value_or(0),
+        static_cast<double>(options.symmetry == EnergySymmetry::kSymmetric),
+        static_cast<double>(options.coarse_vertices), options.tolerance, static_cast<double>(options.iterations)})
+    hash.update(shortest(number) + " ");
+  for (const auto& shape : set.shapes) hashShape(shape, hash);
+  if (set.template_shape) hashShape(*set.template_shape, hash);
+  return hash.finish();
+}
 
 std::optional<std::string> ShellPgaTrainingOptions::firstViolation(int training_shapes) const {
   if (modes < 1 || modes > training_shapes - 1)
@@ -63,10 +106,18 @@ std::optional<std::string> ShellPgaTrainingOptions::firstViolation(int training_
 }
 
 Solved<ShellPgaModelPtr> trainShellPga(const ShellPgaTrainingSet& set, const ShellPgaTrainingOptions& options,
-                                       const ProgressSink& progress, std::stop_token stop) {
+                                       const ProgressSink& progress, std::stop_token stop,
+                                       const ShellPgaResumption& resumption) {
   requireShapes(set);
   if (const auto violation = options.firstViolation(static_cast<int>(set.shapes.size())))
     throw InvalidInput("options", *violation);
+  ShellPgaCheckpoint state{trainingFingerprint(set, options), {}, {}, {}, false};
+  if (resumption.from && resumption.from->training != state.training)
+    throw InvalidInput("checkpoint", "is of another training");
+  if (resumption.from) state = *resumption.from;
+  const auto keep = [&] {
+    if (resumption.checkpoint) resumption.checkpoint([&] { return state; });
+  };
 
   report(progress, "coarsening", 0);
   ShellPgaParts parts;
@@ -74,9 +125,11 @@ Solved<ShellPgaModelPtr> trainShellPga(const ShellPgaTrainingSet& set, const She
   parts.template_shape = set.template_shape.value_or(set.shapes.front());
   parts.symmetry = options.symmetry;
   parts.bending = options.bending.value_or(defaultBending(set.shapes.front()));
-  parts.coarsening = coarsen(set.topology, set.shapes, {options.coarse_vertices, {}, stop});
+  if (!resumption.from) state.coarsening = coarsen(set.topology, set.shapes, {options.coarse_vertices, {}, stop});
   const Outcome cancelled{Termination::kCancelled, 0, 0};
   if (stop.stop_requested()) return {nullptr, cancelled};
+  keep();
+  parts.coarsening = state.coarsening;
   std::vector<Vertices> coarse;
   for (std::size_t i = 0; i < set.shapes.size(); ++i) {
     coarse.push_back(restrictTo(parts.coarsening, set.shapes[i]));
@@ -86,9 +139,13 @@ Solved<ShellPgaModelPtr> trainShellPga(const ShellPgaTrainingSet& set, const She
 
   const GeodesicCalculus calculus(std::make_shared<ShellStructure>(parts.coarsening.coarse),
                                   {parts.bending, parts.symmetry});
-  const auto spider = frechetMean(
-      calculus, coarse, {options.path_steps, options.iterations, options.tolerance, stop, within(progress, 0.1, 0.75)});
+  const auto spider = trainMean(calculus, coarse, options, state, resumption.checkpoint, progress, stop);
   parts.training = {static_cast<int>(set.shapes.size()), spider, {}, 0};
+  if (spider.termination == Termination::kCancelled) return {nullptr, cancelled};
+  state.spider = spider.solution;
+  state.mean = spider;
+  state.mean_ended = true;
+  keep();
   if (stop.stop_requested()) return {nullptr, cancelled};
   report(progress, "principal variations", 0.75);
   auto pga = principalVariations(calculus, spider.solution, options.modes, {100, 1e-8, stop});

@@ -1,5 +1,6 @@
 #pragma once
 
+#include "core/model/shell_pga_checkpoint.h"
 #include "core/model/shell_pga_model.h"
 #include "core/numerics/progress.h"
 
@@ -26,12 +27,24 @@ struct ShellPgaTrainingSet {
   std::optional<Vertices> template_shape;  ///< V x 3; the first shape where not given
 };
 
+/// Keeps a training across processes.
+struct ShellPgaResumption {
+  CheckpointSink checkpoint;                 ///< may be empty
+  const ShellPgaCheckpoint* from = nullptr;  ///< where to go on; null: from the beginning
+};
+
+/// What ties a checkpoint to its training: a hash of shapes and options.
+std::string trainingFingerprint(const ShellPgaTrainingSet& set, const ShellPgaTrainingOptions& options);
+
 /// Trains a model: coarsens all shapes together, then mean, Gram matrix and principal variations on the coarse mesh,
 /// and learns the prolongation. Throws InvalidInput naming the option, "topology" or shapes[i]: fewer than two shapes,
 /// a wrong vertex count, a degenerate triangle, several components, two shapes alike up to a rigid motion.
 /// The solution is null when the computation was cancelled or failed before there were principal variations; otherwise
 /// the outcome says whether mean and variations converged. Runs parallel loops in the calling thread's TBB arena.
+/// Resumed from a checkpoint, it goes on as if it had not been interrupted and gives the same model. Throws
+/// InvalidInput naming "checkpoint" when that is of another training.
 Solved<ShellPgaModelPtr> trainShellPga(const ShellPgaTrainingSet& set, const ShellPgaTrainingOptions& options,
-                                       const ProgressSink& progress, std::stop_token stop);
+                                       const ProgressSink& progress, std::stop_token stop,
+                                       const ShellPgaResumption& resumption = {});
 
 }  // namespace shaped

@@ -74,14 +74,14 @@ ElasticNetwork buildSpider(const Vertices& mean, std::vector<Path> arms, int ste
   return network;
 }
 
-std::vector<Path> splitArms(ElasticNetwork network, std::size_t count, int steps) {
-  std::vector<Path> arms(count);
+Spider spiderOf(ElasticNetwork network, std::size_t count, int steps) {
+  Spider spider{std::move(network.nodes.front()), std::vector<Path>(count)};
   std::size_t node = 1;
-  for (auto& arm : arms) {
-    arm.push_back(network.nodes.front());
+  for (auto& arm : spider.arms) {
+    arm.push_back(spider.mean);
     for (int k = 0; k < steps; ++k) arm.push_back(std::move(network.nodes[node++]));
   }
-  return arms;
+  return spider;
 }
 
 /// The elastic average with a rough geodesic to each input.
@@ -125,18 +125,20 @@ Solved<Spider> frechetMean(const GeodesicCalculus& calculus, const std::vector<V
   Spider start = options.start ? *options.start : startSpider(calculus, shapes, options);
   for (std::size_t i = 0; i < shapes.size(); ++i) start.arms[i].back() = shapes[i];
   if (options.stop.stop_requested()) return {std::move(start), Outcome{Termination::kCancelled, 0, 1}};
-  NetworkOptions network_options{options.max_iterations, options.tolerance, options.stop, {}};
+  NetworkOptions network_options{options.max_iterations, options.tolerance, options.stop, {}, {}};
   if (options.progress)
     network_options.on_iteration = [&](int iteration, double residual) {
       const double fraction = 1 - 0.7 * std::pow(0.85, iteration);
       options.progress({"Frechet mean, Newton step " + std::to_string(iteration), fraction, residual});
     };
+  if (options.on_iterate)
+    network_options.on_iterate = [&](const Outcome& so_far, const ElasticNetwork& iterate) {
+      options.on_iterate(so_far, [&] { return spiderOf(iterate, shapes.size(), steps); });
+    };
   auto relaxed = relax(calculus.structure(), calculus.energy(), buildSpider(start.mean, std::move(start.arms), steps),
                        network_options);
-  Spider spider;
-  spider.mean = relaxed.solution.nodes.front();
-  spider.arms = splitArms(std::move(relaxed.solution), shapes.size(), steps);
-  return {std::move(spider), relaxed};
+  const Outcome outcome = relaxed;
+  return {spiderOf(std::move(relaxed.solution), shapes.size(), steps), outcome};
 }
 
 }  // namespace shaped

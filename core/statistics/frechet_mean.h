@@ -18,6 +18,9 @@ struct FrechetMeanOptions {
   std::stop_token stop;
   ProgressSink progress;
   const Spider* start = nullptr;  ///< of similar shapes in the same order with as many steps; null: start anew
+  /// Sees every iterate of the Newton method, and the last one again when the stop token has fired; may be empty.
+  /// Started from an iterate, the method goes on as if it had not been interrupted. iterate(): makes the spider.
+  std::function<void(const Outcome& so_far, const std::function<Spider()>& iterate)> on_iterate = {};
 };
 
 /// The discrete Frechet mean (10) with its geodesics to the inputs, relaxed together: every inner shape of every arm and
