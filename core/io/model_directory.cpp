@@ -156,6 +156,19 @@ std::shared_ptr<const TensorFile> readTensors(const fs::path& path, const ModelM
   return tensors;
 }
 
+/// Removes what crashed publishers and removers left in a model's folder, and the folder if nothing else is in it.
+void tidy(const fs::path& model_folder) {
+  {
+    const FolderLock lock(model_folder);
+    removeAbandoned(model_folder);
+    std::error_code none;
+    for (const auto& entry : fs::directory_iterator(model_folder, none))
+      if (entry.path().filename().string().starts_with(std::string(kHighestVersion) + ".partial-"))
+        fs::remove(entry.path(), none);
+  }
+  ::rmdir(model_folder.c_str());  // fails, as it should, where there is a version
+}
+
 }  // namespace
 
 ModelDirectory::ModelDirectory(fs::path folder) : folder_(fs::absolute(folder)) {
@@ -164,6 +177,9 @@ ModelDirectory::ModelDirectory(fs::path folder) : folder_(fs::absolute(folder)) 
   if (error) throw FileError(folder_.string(), "cannot be made: " + error.message());
   const FolderLock lock(folder_);
   removeAbandoned(folder_);
+  std::error_code none;
+  for (const auto& entry : fs::directory_iterator(folder_, none))
+    if (entry.is_directory(none) && !entry.path().filename().string().starts_with('.')) tidy(entry.path());
 }
 
 fs::path ModelDirectory::folderOf(const std::string& model) const {

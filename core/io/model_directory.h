@@ -45,7 +45,8 @@ struct StoredModel {
 /// others.
 class ModelDirectory {
  public:
-  /// Creates the folder when it is missing. Throws FileError when that fails.
+  /// Creates the folder when it is missing, and clears away what crashed processes left in it. Throws FileError when
+  /// that fails.
   explicit ModelDirectory(std::filesystem::path folder);
 
   /// Writes a new version and returns its number, one above the highest ever given. Everything is on the disk when it
