@@ -23,4 +23,28 @@ v1::Job cancelJob(v1::Jobs::Stub& jobs, const std::string& id, const CallOptions
   return response.job();
 }
 
+std::vector<v1::Job> listJobs(v1::Jobs::Stub& jobs, const std::vector<v1::JobState>& states,
+                              const CallOptions& options) {
+  v1::ListJobsRequest request;
+  request.set_page_size(1000);
+  for (const auto state : states) request.add_states(state);
+  std::vector<v1::Job> all;
+  do {
+    Call call(options);
+    v1::ListJobsResponse response;
+    require(jobs.List(call.context(), request, &response));
+    all.insert(all.end(), response.jobs().begin(), response.jobs().end());
+    request.set_page_token(response.next_page_token());
+  } while (!request.page_token().empty());
+  return all;
+}
+
+void deleteJob(v1::Jobs::Stub& jobs, const std::string& id, const CallOptions& options) {
+  Call call(options);
+  v1::DeleteJobRequest request;
+  request.set_id(id);
+  v1::DeleteJobResponse response;
+  require(jobs.Delete(call.context(), request, &response));
+}
+
 }  // namespace shaped::client

@@ -13,6 +13,7 @@ find_package(embree 3 CONFIG REQUIRED)
 find_package(PNG REQUIRED)
 find_package(OpenMP REQUIRED COMPONENTS CXX)  # only to limit the team inside CHOLMOD
 find_package(OpenSSL REQUIRED)
+find_package(SQLite3 REQUIRED)
 find_package(yaml-cpp CONFIG REQUIRED)
 
 # SuiteSparse and METIS come without CMake packages in Debian 12. Without the supernodal module neither is linked, nor its licence.

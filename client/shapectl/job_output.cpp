@@ -12,8 +12,9 @@ namespace {
 
 ExitCode endOf(const v1::Job& job) {
   if (job.state() == v1::JOB_STATE_CANCELLED) return ExitCode::kCancelled;
-  const bool solver_ended = job.report().termination() != v1::TERMINATION_UNSPECIFIED;
-  if (solver_ended) return exitCodeOf(job.report());
+  // A job that failed for another reason than its solver, say a full disk, may have a converged report.
+  const bool by_solver = job.state() == v1::JOB_STATE_SUCCEEDED || job.error_code() == grpc::FAILED_PRECONDITION;
+  if (by_solver && job.has_report()) return exitCodeOf(job.report());
   return exitCodeOf(static_cast<grpc::StatusCode>(job.error_code()));
 }
 
@@ -28,15 +29,20 @@ std::string nameOf(v1::JobState state) {
 
 nlohmann::json toJson(const v1::Job& job) {
   nlohmann::json document{{"id", job.id()},
+                          {"kind", job.kind()},
                           {"state", nameOf(job.state())},
                           {"model_name", job.model_name()},
                           {"dataset", job.dataset()},
                           {"stage", job.stage()},
                           {"fraction", job.fraction()},
                           {"stage_residual", job.residual()},
+                          {"attempts", job.attempts()},
+                          {"cancel_requested", job.cancel_requested()},
                           {"created", timeText(job.created())},
                           {"started", timeText(job.started())},
                           {"ended", timeText(job.ended())}};
+  if (!job.resumed_from().empty()) document["resumed_from"] = job.resumed_from();
+  if (!job.request_id().empty()) document["request_id"] = job.request_id();
   if (job.has_report()) {
     addReport(document, job.report());
     document["smallest_area_ratio"] = job.smallest_area_ratio();
@@ -53,7 +59,9 @@ std::string jobText(const v1::Job& job) {
   if (job.has_model()) text << "  " << modelText(job.model());
   if (job.has_report()) text << "  " << reportText(job.report());
   if (!job.error().empty()) text << "  " << job.error();
+  if (job.attempts() > 1) text << "  attempt " << job.attempts();
   if (job.state() == v1::JOB_STATE_RUNNING) text << "  " << job.stage();
+  if (job.state() == v1::JOB_STATE_RUNNING && job.cancel_requested()) text << "  (asked to stop)";
   return text.str();
 }
 

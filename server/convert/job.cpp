@@ -1,5 +1,6 @@
 #include "server/convert/job.h"
 
+#include "core/numerics/error.h"
 #include "server/convert/report.h"
 #include "server/convert/time.h"
 
@@ -24,6 +25,13 @@ v1::JobState toProto(JobState state) {
 
 }  // namespace
 
+JobState stateFromProto(v1::JobState state, const std::string& field) {
+  for (const auto one :
+       {JobState::kQueued, JobState::kRunning, JobState::kSucceeded, JobState::kFailed, JobState::kCancelled})
+    if (toProto(one) == state) return one;
+  throw InvalidInput(field, std::to_string(state) + " is no state of a job");
+}
+
 void toProto(const JobRecord& record, v1::Job& job) {
   job.set_id(record.id);
   job.set_state(toProto(record.state));
@@ -37,6 +45,11 @@ void toProto(const JobRecord& record, v1::Job& job) {
   if (record.ended) toProto(*record.ended, *job.mutable_ended());
   job.set_error(record.error);
   job.set_error_code(record.error_code);
+  job.set_kind(record.kind);
+  job.set_attempts(record.attempts);
+  job.set_resumed_from(record.resumed_from);
+  job.set_request_id(record.request_id);
+  job.set_cancel_requested(record.cancel_requested);
   if (!record.result) return;
   toProto(record.result->outcome, record.result->seconds, *job.mutable_report());
   job.set_smallest_area_ratio(record.result->smallest_area_ratio);

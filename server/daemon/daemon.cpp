@@ -16,10 +16,19 @@ namespace {
 // Lists, uploads and deletions: short, often waiting for the disk.
 constexpr int kLightThreads = 2;
 constexpr std::chrono::hours kLongestHeavyCall(12);
+constexpr std::size_t kWaitingJobs = 64;
 constexpr AdmissionLimits kHeavyLimits{.queue_length = 8, .queue_bytes = 64 << 20, .open_streams = 1};
 
 /// One request, one thread: parallel loops inside a solver stay in the worker's own arena of one.
 void alone(const std::function<void()>& serve) { runInArena(1, serve); }
+
+JobLimits jobLimits(const DaemonOptions& options) {
+  return {.running = 1,
+          .waiting = kWaitingJobs,
+          .threads = options.threads,
+          .crashes = options.job_crashes,
+          .retention = {options.keep_jobs, std::chrono::hours(static_cast<int>(24 * options.keep_jobs_days))}};
+}
 
 }  // namespace
 
@@ -29,10 +38,15 @@ Daemon::Daemon(const DaemonOptions& options)
       lock_(options.store),
       models_(options.store / "models", options.models),
       datasets_(options.store / "datasets"),
+      job_registry_(options.store / "jobs.sqlite"),
       pool_(options.threads, options.admission, alone),
       light_(kLightThreads, options.admission, alone),
       heavy_(1, kHeavyLimits, {}),
-      jobs_(job_registry_, {.running = 1, .waiting = 64, .threads = options.threads}),
+      jobs_(job_registry_,
+            {{kTrainShellPga,
+              shellPgaTraining({datasets_, models_, std::chrono::duration<double>(options.publish_patience),
+                                std::chrono::duration<double>(options.checkpoint_every)})}},
+            jobLimits(options), options.store / "jobs"),
       runtime_{pool_,
                light_,
                heavy_,
@@ -44,10 +58,9 @@ Daemon::Daemon(const DaemonOptions& options)
                security_.access()},
       models_service_(runtime_, models_),
       datasets_service_(runtime_, options_.limits, datasets_),
-      jobs_service_(runtime_, job_registry_, jobs_,
-                    [training = TrainingContext{datasets_, models_, jobs_,
-                                                std::chrono::duration<double>(options.publish_patience)}](
-                        const v1::TrainRequest& request) { return startTraining(training, request); }),
+      jobs_service_(
+          runtime_, job_registry_, jobs_,
+          [this](const v1::TrainRequest& request) { return startTraining(datasets_, job_registry_, jobs_, request); }),
       shapes_service_(runtime_, options_.limits, models_, datasets_),
       server_service_(runtime_, options_.limits, "shaped " SHAPED_VERSION) {
   listen(options.listen);
@@ -106,7 +119,8 @@ void Daemon::announceStop() {
 void Daemon::shutdown(std::chrono::duration<double> grace) {
   if (!server_) return;
   announceStop();
-  jobs_.cancelAll();
+  jobs_.leave();
+  jobs_service_.stopWatching();
   server_->Shutdown(std::chrono::system_clock::now() +
                     std::chrono::duration_cast<std::chrono::system_clock::duration>(grace));
   server_.reset();

@@ -8,6 +8,7 @@
 #include "server/daemon/store_lock.h"
 #include "server/datasets/dataset_store.h"
 #include "server/jobs/job_runner.h"
+#include "server/jobs/sqlite_job_registry.h"
 #include "server/rpc/datasets_service.h"
 #include "server/rpc/jobs_service.h"
 #include "server/rpc/models_service.h"
@@ -37,7 +38,8 @@ class Daemon {
   void reload(const DaemonOptions& options);
   /// Health says NOT_SERVING from here on; calls are still answered.
   void announceStop();
-  /// Takes no new calls, cancels jobs, lets running calls go on for `grace`, then cancels them.
+  /// Takes no new calls, puts jobs back to go on at the next start, lets running calls go on for `grace`, then cancels
+  /// them.
   void shutdown(std::chrono::duration<double> grace);
 
  private:
@@ -49,7 +51,7 @@ class Daemon {
   const StoreLock lock_;
   ModelStore models_;
   DatasetStore datasets_;
-  MemoryJobRegistry job_registry_;
+  SqliteJobRegistry job_registry_;
   DeadlineTimer timer_;
   WorkerPool pool_, light_, heavy_;
   JobRunner jobs_;

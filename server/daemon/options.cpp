@@ -108,6 +108,18 @@ std::vector<OptionSpec> makeSpecs() {
           "publish-patience", "S", When::kAtStart, 0, kMostSeconds, [](auto& o) -> auto& { return o.publish_patience; },
           "how long a trained model waits for room on a full disk [s]"),
       numberOption(
+          "checkpoint-every", "S", When::kAtStart, 0, kMostSeconds, [](auto& o) -> auto& { return o.checkpoint_every; },
+          "time between two checkpoints of a running job [s]"),
+      countOption(
+          "job-crashes", "N", When::kAtStart, kMostCount, [](auto& o) -> auto& { return o.job_crashes; },
+          "crashes over one job without a checkpoint in between until it is given up"),
+      countOption(
+          "keep-jobs", "N", When::kAtStart, kMostCount, [](auto& o) -> auto& { return o.keep_jobs; },
+          "ended jobs that are remembered"),
+      numberOption(
+          "keep-jobs-days", "D", When::kAtStart, 0, 36500, [](auto& o) -> auto& { return o.keep_jobs_days; },
+          "for at most so many days; 0: whatever their age"),
+      numberOption(
           "drain", "S", When::kWhileRunning, 0, kMostSeconds, [](auto& o) -> auto& { return o.drain; },
           "asked to stop: how long it still answers while health says NOT_SERVING [s]"),
       numberOption(

@@ -22,7 +22,7 @@ class Busy : public std::runtime_error {
   using std::runtime_error::runtime_error;
 };
 
-/// Not possible as things stand, whatever the request says.
+/// What is asked for does not go with the state that its object is in; it may, later.
 class WrongState : public std::runtime_error {
   using std::runtime_error::runtime_error;
 };

@@ -1,16 +1,17 @@
 #pragma once
 
-#include <atomic>
+#include <condition_variable>
+#include <filesystem>
 #include <functional>
 #include <map>
-#include <memory>
 #include <mutex>
 #include <stop_token>
 #include <string>
+#include <thread>
+#include <vector>
 
 #include "core/numerics/progress.h"
 #include "server/jobs/job_registry.h"
-#include "server/scheduling/worker_pool.h"
 
 namespace shaped::server {
 
@@ -18,36 +19,74 @@ struct JobLimits {
   int running = 1;           ///< jobs at a time, >= 1
   std::size_t waiting = 64;  ///< jobs that wait, >= 1
   int threads = 1;           ///< of each job's TBB arena, >= 1
+  int crashes = 3;           ///< processes that may die over one job without a checkpoint in between, >= 1
+  JobRetention retention;
 };
 
-/// Runs jobs in threads of their own, beside the workers that serve requests, each in an arena of bounded size.
+/// What the work of a job is given.
+struct JobRun {
+  JobRecord job;                 ///< as it was when it was claimed
+  std::filesystem::path folder;  ///< of this job alone, kept until it has ended: for checkpoints
+  ProgressSink progress;
+  std::stop_token stop;                                   ///< cancelled, or the daemon is leaving
+  std::function<void(const std::string& stage)> resumed;  ///< it goes on from a checkpoint of this stage
+  std::function<void()> checkpointed;                     ///< it has kept a checkpoint of this run
+  std::function<void(const JobResult& so_far)> solved;    ///< the solver has ended; call before publishing
+};
+
+/// How jobs of one kind are done.
+struct JobKind {
+  /// Does the work; throws to fail. Returns with outcome kCancelled, or throws Stopped, when the token fired.
+  std::function<JobResult(const JobRun&)> work;
+  /// What a job has published although its process died before that was recorded: the version; 0: nothing.
+  std::function<std::uint64_t(const JobRecord&)> published;
+};
+
+/// Runs the jobs of a registry in threads of their own, beside the workers that serve requests, each in an arena of
+/// bounded size. A job that a dead process left running is recorded as what it was (published, cancelled) or goes on
+/// from its checkpoint; see docs/operations.md.
 class JobRunner {
  public:
-  /// Does the work; throws to fail. Returns with outcome kCancelled when the token fired.
-  using Work = std::function<JobResult(const ProgressSink&, std::stop_token)>;
+  using Kinds = std::map<std::string, JobKind>;
 
-  JobRunner(JobRegistry& registry, const JobLimits& limits);
-  /// Cancels what runs and what waits, and waits until it has ended.
+  /// folder: <folder>/<job>/ is each job's own; what belongs to no job that goes on is removed. Settles what dead
+  /// processes left, then begins. Throws FileError and what the registry throws.
+  JobRunner(JobRegistry& registry, Kinds kinds, const JobLimits& limits, std::filesystem::path folder);
+  /// As leave(), then waits.
   ~JobRunner();
   JobRunner(const JobRunner&) = delete;
   JobRunner& operator=(const JobRunner&) = delete;
 
-  /// Registers the job and queues its work. Throws Busy when too many wait.
-  JobRecord start(const std::string& model_name, const std::string& dataset, Work work);
+  /// Creates a job of a known kind and queues it; see JobRegistry::create.
+  JobRecord start(JobRecord wanted);
   /// Asks a job to stop: one that waits ends at once, one that runs soon. Throws NotFound.
   JobRecord cancel(const std::string& job);
-  /// Asks all jobs to stop, without waiting for them.
-  void cancelAll();
+  /// Claims no more jobs and asks the running ones to keep a checkpoint and stop; they are queued again, for the next
+  /// start. Does not wait.
+  void leave();
 
  private:
-  void run(const std::string& id, const Work& work, std::stop_token stop);
-  void forget(const std::string& id);
+  void settle(const JobRecord& left);
+  void removeStrayFolders() const;
+  void serve();
+  std::optional<JobRecord> claimSoon();
+  void run(const JobRecord& job);
+  JobRun runOf(const JobRecord& job, std::stop_token stop);
+  bool end(const std::string& id, const std::function<void(JobRecord&)>& change);
+  std::stop_token enter(const std::string& id);
+  bool pause(std::chrono::milliseconds time, std::uint64_t seen);
+  std::filesystem::path folderOf(const std::string& id) const { return folder_ / id; }
 
   JobRegistry& registry_;
+  const Kinds kinds_;
   const JobLimits limits_;
+  const std::filesystem::path folder_;
   std::mutex mutex_;
-  std::map<std::string, std::stop_source> stops_;  // of jobs that have not ended
-  WorkerPool pool_;                                // last: its threads use what stands above
+  std::condition_variable wake_;
+  std::uint64_t wakes_ = 0;
+  bool leaving_ = false;
+  std::map<std::string, std::stop_source> stops_;  // of jobs that run
+  std::vector<std::thread> threads_;
 };
 
 }  // namespace shaped::server

@@ -292,6 +292,16 @@ ServedModelPtr ModelStore::publish(const std::string& name, ShellPgaModelPtr mod
   return served;
 }
 
+std::uint64_t ModelStore::publishedBy(const std::string& name, const std::string& job_key) const {
+  for (const auto version : directory_.versions(name)) try {
+      if (provenanceOf(directory_.manifest(name, version)).job_key == job_key)
+        return static_cast<std::uint64_t>(version);
+    } catch (const ModelNotFound&) {  // removed while we looked
+    } catch (const FileError&) {      // damaged: whose it was cannot be told
+    }
+  return 0;
+}
+
 std::vector<std::uint64_t> ModelStore::remove(const std::string& name, std::uint64_t version) {
   std::vector<std::uint64_t> removed;
   const Lock lock(mutex_);

@@ -73,6 +73,8 @@ class ModelStore {
   /// Writes a new version, for which its name stands afterwards; it is in memory if the budget allows. Throws FileError
   /// when the disk fails: nothing is left behind.
   ServedModelPtr publish(const std::string& name, ShellPgaModelPtr model, const Provenance& provenance);
+  /// The version of a name that a job of this key has published; 0: none.
+  std::uint64_t publishedBy(const std::string& name, const std::string& job_key) const;
   /// Removes one version, or all (0); returns the versions removed. Throws ModelNotFound; WrongState when a label
   /// stands for the one version; FileError when the disk fails.
   std::vector<std::uint64_t> remove(const std::string& name, std::uint64_t version);

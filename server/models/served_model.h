@@ -30,6 +30,7 @@ struct ModelSelector {
 struct Provenance {
   std::string dataset;
   std::chrono::system_clock::time_point created;
+  std::string job, job_key;  ///< the job that made it, and its key; empty: none
 };
 Provenance provenanceOf(const ModelManifest& manifest);
 nlohmann::json toJson(const Provenance& provenance);

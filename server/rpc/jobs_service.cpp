@@ -1,10 +1,32 @@
 #include "server/rpc/jobs_service.h"
 
+#include <algorithm>
+
 #include "server/convert/job.h"
 #include "server/rpc/unary_call.h"
+#include "server/rpc/wait_call.h"
 #include "server/rpc/watch_call.h"
 
 namespace shaped::server {
+namespace {
+
+constexpr std::uint32_t kDefaultPage = 100, kLargestPage = 1000;
+
+void list(const JobRegistry& registry, const v1::ListJobsRequest& request, v1::ListJobsResponse& response) {
+  JobQuery query{{}, request.page_token(), request.page_size() == 0 ? kDefaultPage : request.page_size()};
+  query.limit = std::min<std::size_t>(query.limit, kLargestPage);
+  for (int i = 0; i < request.states_size(); ++i)
+    query.states.push_back(stateFromProto(request.states(i), "states[" + std::to_string(i) + "]"));
+  ++query.limit;  // one more tells whether there is a next page
+  auto records = registry.list(query);
+  if (records.size() == query.limit) {
+    records.pop_back();
+    response.set_next_page_token(records.back().id);
+  }
+  for (const auto& record : records) toProto(record, *response.add_jobs());
+}
+
+}  // namespace
 
 grpc::ServerUnaryReactor* JobsService::Train(grpc::CallbackServerContext* context, const v1::TrainRequest* request,
                                              v1::TrainResponse* response) {
@@ -22,16 +44,14 @@ grpc::ServerUnaryReactor* JobsService::Get(grpc::CallbackServerContext* context,
 
 grpc::ServerUnaryReactor* JobsService::List(grpc::CallbackServerContext* context, const v1::ListJobsRequest* request,
                                             v1::ListJobsResponse* response) {
-  return startUnary<v1::ListJobsRequest, v1::ListJobsResponse>(runtime_, runtime_.light, "Jobs.List", context, request,
-                                                               response, [this](const auto&, auto& answer, Call&) {
-                                                                 for (const auto& record : registry_.list())
-                                                                   toProto(record, *answer.add_jobs());
-                                                               });
+  return startUnary<v1::ListJobsRequest, v1::ListJobsResponse>(
+      runtime_, runtime_.light, "Jobs.List", context, request, response,
+      [this](const auto& wanted, auto& answer, Call&) { list(registry_, wanted, answer); });
 }
 
 grpc::ServerWriteReactor<v1::WatchJobResponse>* JobsService::Watch(grpc::CallbackServerContext* context,
                                                                    const v1::WatchJobRequest* request) {
-  const auto call = std::make_shared<WatchCall>(runtime_, registry_, *context, request->id());
+  const auto call = std::make_shared<WatchCall>(runtime_, registry_, *context, request->id(), stop_.get_token());
   call->enter();
   return call.get();
 }
@@ -41,6 +61,20 @@ grpc::ServerUnaryReactor* JobsService::Cancel(grpc::CallbackServerContext* conte
   return startUnary<v1::CancelJobRequest, v1::CancelJobResponse>(
       runtime_, runtime_.light, "Jobs.Cancel", context, request, response,
       [this](const auto& wanted, auto& answer, Call&) { toProto(runner_.cancel(wanted.id()), *answer.mutable_job()); });
+}
+
+grpc::ServerUnaryReactor* JobsService::Wait(grpc::CallbackServerContext* context, const v1::WaitJobRequest* request,
+                                            v1::WaitJobResponse* response) {
+  const auto call = std::make_shared<WaitCall>(runtime_, registry_, *context, *request, *response, stop_.get_token());
+  call->enter();
+  return call.get();
+}
+
+grpc::ServerUnaryReactor* JobsService::Delete(grpc::CallbackServerContext* context, const v1::DeleteJobRequest* request,
+                                              v1::DeleteJobResponse* response) {
+  return startUnary<v1::DeleteJobRequest, v1::DeleteJobResponse>(
+      runtime_, runtime_.light, "Jobs.Delete", context, request, response,
+      [this](const auto& wanted, auto&, Call&) { registry_.remove(wanted.id()); });
 }
 
 }  // namespace shaped::server

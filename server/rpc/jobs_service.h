@@ -1,6 +1,7 @@
 #pragma once
 
 #include <functional>
+#include <stop_token>
 
 #include "server/jobs/job_registry.h"
 #include "server/jobs/job_runner.h"
@@ -27,12 +28,20 @@ class JobsService final : public v1::Jobs::CallbackService {
                                                         const v1::WatchJobRequest* request) override;
   grpc::ServerUnaryReactor* Cancel(grpc::CallbackServerContext* context, const v1::CancelJobRequest* request,
                                    v1::CancelJobResponse* response) override;
+  grpc::ServerUnaryReactor* Wait(grpc::CallbackServerContext* context, const v1::WaitJobRequest* request,
+                                 v1::WaitJobResponse* response) override;
+  grpc::ServerUnaryReactor* Delete(grpc::CallbackServerContext* context, const v1::DeleteJobRequest* request,
+                                   v1::DeleteJobResponse* response) override;
+
+  /// Ends all watching and waiting calls, as the daemon does when it stops.
+  void stopWatching() { stop_.request_stop(); }
 
  private:
   Runtime& runtime_;
   JobRegistry& registry_;
   JobRunner& runner_;
   StartTraining start_training_;
+  std::stop_source stop_;
 };
 
 }  // namespace shaped::server

@@ -11,6 +11,7 @@
 #include "server/datasets/name.h"
 #include "server/errors/errors.h"
 #include "server/errors/status.h"
+#include "server/telemetry/call_log.h"
 
 namespace shaped::server {
 namespace {
@@ -41,6 +42,12 @@ ShellPgaTrainingOptions optionsFrom(const v1::ShellPgaTraining& message, const D
   return options;
 }
 
+v1::TrainRequest requestOf(const JobRecord& job) {
+  v1::TrainRequest request;
+  if (!request.ParseFromString(job.request)) throw Corrupted("the request of job " + job.id + " cannot be read");
+  return request;
+}
+
 /// False when the token fired first.
 bool sleepUnlessStopped(Clock::duration time, const std::stop_token& stop) {
   std::mutex mutex;
@@ -49,17 +56,16 @@ bool sleepUnlessStopped(Clock::duration time, const std::stop_token& stop) {
   return !wake.wait_for(lock, stop, time, [] { return false; }) && !stop.stop_requested();
 }
 
-/// A full disk must not cost hours of training: try again until there is room, the patience ends or the job is stopped.
-ServedModelPtr publishPatiently(const TrainingContext& context, const std::string& name, const ShellPgaModelPtr& model,
-                                const Provenance& provenance, const ProgressSink& progress,
-                                const std::stop_token& stop) {
+/// A full disk must not cost hours of training: tries again until there is room, the patience ends or the job is
+/// stopped.
+void patiently(const TrainingContext& context, const JobRun& run, const std::function<void()>& write) {
   const auto until = Clock::now() + std::chrono::duration_cast<Clock::duration>(context.publish_patience);
   while (true) try {
-      return context.models.publish(name, model, provenance);
+      return write();
     } catch (const FileError& error) {
       if (!saysDiskFull(error.what()) || Clock::now() >= until) throw;
-      progress({std::string("waiting for room on the disk: ") + error.what(), 1, 0});
-      if (!sleepUnlessStopped(std::chrono::seconds(2), stop)) throw Stopped();
+      run.progress({std::string("waiting for room on the disk: ") + error.what(), 1, 0});
+      if (!sleepUnlessStopped(std::chrono::seconds(2), run.stop)) throw Stopped();
     }
 }
 
@@ -69,33 +75,105 @@ ShellPgaModelPtr withSeconds(const ShellPgaModel& model, double seconds) {
   return std::make_shared<const ShellPgaModel>(std::move(parts));
 }
 
-JobResult train(const TrainingContext& context, const v1::TrainRequest& request, const ShellPgaTrainingOptions& options,
-                const ProgressSink& progress, const std::stop_token& stop) {
+/// The checkpoint of one training job: found where an earlier process left it, written as time goes by.
+class TrainingCheckpoint {
+ public:
+  TrainingCheckpoint(const JobRun& run, std::chrono::duration<double> every)
+      : run_(run), path_(run.folder / "checkpoint.safetensors"), every_(every) {}
+
+  /// What is there and of this training; a damaged or foreign one is told in the log and left aside.
+  std::optional<ShellPgaCheckpoint> find(const std::string& training) const {
+    if (!std::filesystem::exists(path_)) return std::nullopt;
+    try {
+      auto checkpoint = readCheckpoint(path_);
+      if (checkpoint.training == training) return checkpoint;
+      logError("job " + run_.job.id + " begins anew: " + path_.string() + " is of another training");
+    } catch (const std::exception& problem) {
+      logError("job " + run_.job.id + " begins anew: " + problem.what());
+    }
+    return std::nullopt;
+  }
+
+  /// Keeps the state when the last one is old, or the job is to stop. A disk that takes none does not end the training.
+  void offer(const std::function<ShellPgaCheckpoint()>& state) {
+    if (Clock::now() - kept_ < every_ && !run_.stop.stop_requested()) return;
+    kept_ = Clock::now();
+    try {
+      writeCheckpoint(path_, state());
+      run_.checkpointed();
+    } catch (const std::exception& problem) {
+      logError("job " + run_.job.id + " goes on without a checkpoint: " + problem.what());
+    }
+  }
+
+ private:
+  const JobRun& run_;
+  const std::filesystem::path path_;
+  const std::chrono::duration<double> every_;
+  Clock::time_point kept_ = Clock::now();
+};
+
+Solved<ShellPgaModelPtr> trainResumed(const JobRun& run, const ShellPgaTrainingSet& set,
+                                      const ShellPgaTrainingOptions& options, std::chrono::duration<double> every) {
+  TrainingCheckpoint checkpoint(run, every);
+  const auto found = checkpoint.find(trainingFingerprint(set, options));
+  run.resumed(found ? found->stage() : "");
+  return trainShellPga(set, options, run.progress, run.stop,
+                       {[&](const auto& state) { checkpoint.offer(state); }, found ? &*found : nullptr});
+}
+
+std::string unconvergedText(const Outcome& outcome) {
+  return "the training did not converge (" + std::string(name(outcome.termination)) +
+         "), so no model was published; ask for it with publish_unconverged, or allow more iterations";
+}
+
+JobResult train(const TrainingContext& context, const JobRun& run) {
   const auto begin = Clock::now();
+  const auto request = requestOf(run.job);
+  const auto options = optionsFrom(request.shell_pga(), context.datasets.get(request.dataset()));
   auto dataset = context.datasets.load(request.dataset());
   const ShellPgaTrainingSet set{dataset.topology, std::move(dataset.shapes), std::move(dataset.template_shape)};
-  const auto trained = trainShellPga(set, options, progress, stop);
-  JobResult result{request.model_name(), 0, trained, std::chrono::duration<double>(Clock::now() - begin).count(), 0};
-  if (stop.stop_requested()) result.outcome.termination = Termination::kCancelled;
-  if (!trained.solution || result.outcome.termination == Termination::kCancelled) return result;
-  result.smallest_area_ratio = smallestAreaRatio(set.topology->faces(), set.shapes.front(), trained.solution->mean());
-  if (!trained.converged() && !request.publish_unconverged()) return result;
-  const Provenance provenance{request.dataset(), std::chrono::system_clock::now()};
+  const auto trained = trainResumed(run, set, options, context.checkpoint_every);
+  JobResult result{
+      request.model_name(), 0, trained, std::chrono::duration<double>(Clock::now() - begin).count(), 0, {}};
+  if (run.stop.stop_requested()) result.outcome.termination = Termination::kCancelled;
+  if (result.outcome.termination == Termination::kCancelled) return result;
+  if (trained.solution)
+    result.smallest_area_ratio = smallestAreaRatio(set.topology->faces(), set.shapes.front(), trained.solution->mean());
+  if (!trained.solution || (!trained.converged() && !request.publish_unconverged())) {
+    result.failure = unconvergedText(trained);
+    return result;
+  }
+  patiently(context, run, [&] { run.solved(result); });
+  const Provenance provenance{request.dataset(), std::chrono::system_clock::now(), run.job.id, run.job.key};
   const auto model = withSeconds(*trained.solution, result.seconds);
-  result.model_version = publishPatiently(context, request.model_name(), model, provenance, progress, stop)->version;
+  patiently(context, run,
+            [&] { result.model_version = context.models.publish(request.model_name(), model, provenance)->version; });
   return result;
 }
 
 }  // namespace
 
-JobRecord startTraining(const TrainingContext& context, const v1::TrainRequest& request) {
+JobKind shellPgaTraining(const TrainingContext& context) {
+  return {[context](const JobRun& run) { return train(context, run); },
+          [context](const JobRecord& job) { return context.models.publishedBy(job.model_name, job.key); }};
+}
+
+JobRecord startTraining(const DatasetStore& datasets, const JobRegistry& registry, JobRunner& runner,
+                        const v1::TrainRequest& request) {
+  if (!request.request_id().empty()) requireName(request.request_id(), "request_id");
   requireName(request.model_name(), "model_name");
   if (!request.has_shell_pga()) throw InvalidInput("method", "is missing; want shell_pga");
-  const auto options = optionsFrom(request.shell_pga(), context.datasets.get(request.dataset()));
-  return context.runner.start(request.model_name(), request.dataset(),
-                              [context, request, options](const ProgressSink& progress, std::stop_token stop) {
-                                return train(context, request, options, progress, stop);
-                              });
+  // A repeated request has its answer even if its dataset has been deleted since.
+  if (request.request_id().empty() || !registry.find(request.request_id()))
+    optionsFrom(request.shell_pga(), datasets.get(request.dataset()));
+  JobRecord wanted;
+  wanted.kind = kTrainShellPga;
+  wanted.request = request.SerializeAsString();
+  wanted.request_id = request.request_id();
+  wanted.model_name = request.model_name();
+  wanted.dataset = request.dataset();
+  return runner.start(std::move(wanted));
 }
 
 }  // namespace shaped::server

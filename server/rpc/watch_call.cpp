@@ -1,11 +1,16 @@
 #include "server/rpc/watch_call.h"
 
 #include "server/convert/job.h"
+#include "server/rpc/wait_call.h"
 
 namespace shaped::server {
 
-WatchCall::WatchCall(Runtime& runtime, JobRegistry& registry, grpc::CallbackServerContext& context, std::string job)
-    : registry_(registry), call_(runtime, context, "Jobs.Watch", runtime.longest_call), job_(std::move(job)) {}
+WatchCall::WatchCall(Runtime& runtime, JobRegistry& registry, grpc::CallbackServerContext& context, std::string job,
+                     std::stop_token stop)
+    : registry_(registry),
+      call_(runtime, context, "Jobs.Watch", runtime.longest_call),
+      job_(std::move(job)),
+      stop_(std::move(stop)) {}
 
 void WatchCall::enter() {
   self_ = shared_from_this();
@@ -15,6 +20,15 @@ void WatchCall::enter() {
     });
   });
   status.ok() ? onChange() : end(status);
+  on_daemon_stops_.emplace(stop_, [weak = weak_from_this()] {
+    if (const auto self = weak.lock()) self->onDaemonStops();
+  });
+}
+
+void WatchCall::onDaemonStops() {
+  const std::scoped_lock lock(mutex_);
+  // What is being written goes first; OnWriteDone sees the stop.
+  if (!writing_) end(daemonStops(job_));
 }
 
 void WatchCall::onChange() {
@@ -43,6 +57,7 @@ void WatchCall::OnWriteDone(bool ok) {
   if (!ok) call_.stop(StopReason::kClient);
   if (call_.stopped()) return end(call_.stopStatus());
   if (last_) return end(grpc::Status::OK);
+  if (stop_.stop_requested()) return end(daemonStops(job_));
   if (changed_) writeNext();
 }
 
@@ -59,6 +74,7 @@ void WatchCall::OnCancel() {
 
 void WatchCall::OnDone() {
   listener_.reset();
+  on_daemon_stops_.reset();
   const auto self = std::move(self_);
 }
 

@@ -4,6 +4,8 @@
 
 #include <memory>
 #include <mutex>
+#include <optional>
+#include <stop_token>
 #include <string>
 
 #include "server/jobs/job_registry.h"
@@ -17,11 +19,14 @@ namespace shaped::server {
 class WatchCall final : public grpc::ServerWriteReactor<v1::WatchJobResponse>,
                         public std::enable_shared_from_this<WatchCall> {
  public:
-  WatchCall(Runtime& runtime, JobRegistry& registry, grpc::CallbackServerContext& context, std::string job);
+  /// stop: fires when the daemon stops.
+  WatchCall(Runtime& runtime, JobRegistry& registry, grpc::CallbackServerContext& context, std::string job,
+            std::stop_token stop);
   void enter();
 
  private:
   void onChange();
+  void onDaemonStops();
   void writeNext();
   void end(const grpc::Status& status);
   void OnWriteDone(bool ok) override;
@@ -31,10 +36,12 @@ class WatchCall final : public grpc::ServerWriteReactor<v1::WatchJobResponse>,
   JobRegistry& registry_;
   Call call_;
   const std::string job_;
+  const std::stop_token stop_;
   std::recursive_mutex mutex_;  // gRPC may run a reaction inside the call that causes it
   bool writing_ = false, changed_ = false, last_ = false;
   v1::WatchJobResponse message_;
   std::shared_ptr<const JobRegistry::Listener> listener_;
+  std::optional<std::stop_callback<std::function<void()>>> on_daemon_stops_;
   std::shared_ptr<WatchCall> self_;
 };
 

@@ -85,6 +85,15 @@ class Layers(unittest.TestCase):
             for include in includes(path):
                 self.assertFalse(include.startswith("server/"), f"{path.relative_to(ROOT)} includes {include}")
 
+    def test_job_storage_hides_behind_its_interface(self):
+        for path in sources("server"):
+            folder, name = path.relative_to(ROOT).parts[1:3] if len(path.relative_to(ROOT).parts) > 2 else ("", "")
+            for include in includes(path):
+                if include == "sqlite3.h":
+                    self.assertEqual((folder, name), ("jobs", "sqlite.cpp"))
+                if include == "server/jobs/sqlite_job_registry.h":
+                    self.assertIn(folder, ("jobs", "daemon"), f"{path.relative_to(ROOT)} knows how jobs are stored")
+
     def test_the_protocol_stands_alone(self):
         for path in (ROOT / "proto").rglob("*.proto"):
             for name in re.findall(r'^import "([^"]+)"', path.read_text(), re.MULTILINE):

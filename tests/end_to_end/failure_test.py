@@ -11,8 +11,8 @@ from support import (CANCELLED, INTERNAL, NOT_FOUND, SUCCESS, UNAVAILABLE, Daemo
 
 
 def limit_files():
-    """No file of the process may grow beyond this: the dataset fits, a model does not."""
-    resource.setrlimit(resource.RLIMIT_FSIZE, (16384, 16384))
+    """No file of the process may grow beyond this: the dataset and the job's record fit, a model does not."""
+    resource.setrlimit(resource.RLIMIT_FSIZE, (36864, 36864))
 
 
 class FullDisk(unittest.TestCase):

@@ -75,18 +75,25 @@ struct Train {
     return response.job();
   }
 
-  /// Nobody waits for the job any more once the watch fails, be it by Ctrl-C or --timeout: it is cancelled.
+  /// Nobody waits for the job any more once the watch ends by Ctrl-C or --timeout: it is cancelled. When the daemon
+  /// goes away, the job stays: it goes on with the next start.
   static v1::Job follow(v1::Jobs::Stub& jobs, const v1::Job& job, const Session& session, ProgressBar& bar) {
     const auto draw = [&bar](const v1::Job& state) { show(bar, state); };
     try {
       return client::watchJob(jobs, job.id(), session.callOptions(), draw);
-    } catch (const client::RpcError&) {
+    } catch (const client::RpcError& error) {
+      if (!session.stop.stop_requested() && error.code() != grpc::DEADLINE_EXCEEDED) throw daemonGone(job, error);
       const client::CallOptions farewell{.timeout = std::chrono::seconds(10), .stop = {}};
       client::cancelJob(jobs, job.id(), farewell);
       const auto ended = client::watchJob(jobs, job.id(), farewell, draw);
       if (!session.stop.stop_requested()) throw;
       return ended;
     }
+  }
+
+  static client::RpcError daemonGone(const v1::Job& job, const client::RpcError& error) {
+    return client::RpcError({error.code(), std::string(error.what()) + "; job " + job.id() +
+                                               " is kept: `shapectl watch " + job.id() + "` follows it again"});
   }
 };
 

@@ -7,7 +7,7 @@ std::vector<Verb> allVerbs() {
       trainVerb(),                                                     //
       modelsVerb(),  describeVerb(),   deleteVerb(),                   //
       loadVerb(),    unloadVerb(),     labelVerb(),       waitVerb(),  //
-      jobsVerb(),    watchVerb(),      cancelVerb(),                   //
+      jobsVerb(),    watchVerb(),      cancelVerb(), deleteJobVerb(),  //
       projectVerb(), synthesizeVerb(), interpolateVerb(), editVerb(),  //
       fitVerb(),     scoreVerb(),      evaluateVerb(),                 //
       sampleVerb(),  renderVerb(),     tokenVerb(),                    //

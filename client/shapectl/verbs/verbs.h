@@ -14,6 +14,7 @@ Verb labelVerb();
 Verb waitVerb();
 Verb describeVerb();
 Verb deleteVerb();
+Verb deleteJobVerb();
 Verb jobsVerb();
 Verb watchVerb();
 Verb cancelVerb();

@@ -289,6 +289,75 @@ TEST_CASE("unknown jobs are not found, in every method") {
   CHECK(reader->Finish().error_code() == grpc::NOT_FOUND);
 }
 
+TEST_CASE("a job that fails can be waited for, listed by page and state, and deleted") {
+  const test::TestDaemon daemon;
+  // Two shapes alike: refused once the training has looked at them.
+  REQUIRE(upload(daemon, {header("alike", 2), frame(sphere.vertices), frame(sphere.vertices)}).ok());
+  const auto stub = v1::Jobs::NewStub(daemon.channel());
+  v1::TrainRequest train;
+  train.set_model_name("m");
+  train.set_dataset("alike");
+  train.mutable_shell_pga()->set_coarse_vertices(50);
+  train.set_request_id("once");
+  const auto start = [&](v1::Job& job) {
+    grpc::ClientContext context;
+    v1::TrainResponse response;
+    const auto status = stub->Train(&context, train, &response);
+    job = response.job();
+    return status.error_code();
+  };
+  v1::Job first, again, other;
+  REQUIRE(start(first) == grpc::OK);
+  REQUIRE(start(again) == grpc::OK);
+  CHECK(again.id() == first.id());
+  train.set_model_name("n");
+  CHECK(start(other) == grpc::ALREADY_EXISTS);
+  train.set_request_id("");
+  REQUIRE(start(other) == grpc::OK);
+
+  const auto wait = [&](const std::string& id, double seconds, v1::Job& job) {
+    grpc::ClientContext context;
+    v1::WaitJobRequest request;
+    request.set_id(id);
+    if (seconds >= 0) request.mutable_timeout()->set_nanos(static_cast<std::int32_t>(1e9 * seconds));
+    v1::WaitJobResponse response;
+    const auto status = stub->Wait(&context, request, &response);
+    job = response.job();
+    return status.error_code();
+  };
+  v1::Job ended;
+  CHECK(wait(first.id(), 0, ended) == grpc::OK);  // as it is
+  CHECK(ended.id() == first.id());
+  CHECK(wait(other.id(), -1, ended) == grpc::OK);
+  CHECK(ended.state() == v1::JOB_STATE_FAILED);
+  CHECK_THAT(ended.error(), Contains("rigid motion"));
+  CHECK(ended.kind() == "train_shell_pga");
+  CHECK(ended.attempts() == 1);
+  CHECK(wait("99", -1, ended) == grpc::NOT_FOUND);
+
+  v1::ListJobsRequest list;
+  list.set_page_size(1);
+  list.add_states(v1::JOB_STATE_FAILED);
+  v1::ListJobsResponse page, rest, none;
+  grpc::ClientContext one, two, three, four;
+  REQUIRE(stub->List(&one, list, &page).ok());
+  REQUIRE(page.jobs_size() == 1);
+  CHECK(page.jobs(0).id() == first.id());
+  list.set_page_token(page.next_page_token());
+  REQUIRE(stub->List(&two, list, &rest).ok());
+  REQUIRE(rest.jobs_size() == 1);
+  CHECK(rest.jobs(0).id() == other.id());
+  CHECK(rest.next_page_token().empty());
+  list.set_page_token("x");
+  CHECK(stub->List(&three, list, &none).error_code() == grpc::INVALID_ARGUMENT);
+
+  v1::DeleteJobRequest doomed;
+  doomed.set_id(first.id());
+  v1::DeleteJobResponse deleted;
+  CHECK(stub->Delete(&four, doomed, &deleted).ok());
+  CHECK(wait(first.id(), -1, ended) == grpc::NOT_FOUND);
+}
+
 TEST_CASE("an address in use is refused") {
   const test::TestDaemon daemon;
   server::DaemonOptions options;

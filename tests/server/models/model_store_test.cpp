@@ -17,7 +17,8 @@ using namespace shaped::server;
 
 namespace {
 
-const Provenance provenance{"tubes", std::chrono::system_clock::time_point(std::chrono::seconds(1'700'000'000))};
+const Provenance provenance{
+    "tubes", std::chrono::system_clock::time_point(std::chrono::seconds(1'700'000'000)), {}, {}};
 
 /// Pins on a thread that may wait.
 ServedModelPtr pinNow(ModelStore& store, const ModelSelector& selector) {
@@ -54,6 +55,18 @@ TEST_CASE("a published model is served at once, and by the next daemon") {
   CHECK(provenanceOf(model->manifest).dataset == "tubes");
   CHECK(provenanceOf(model->manifest).created == provenance.created);
   CHECK(pinNow(store, {"m", 1, ""}) == model);
+}
+
+TEST_CASE("a version tells the job that made it") {
+  const test::TemporaryFolder folder;
+  ModelStore store(folder.path());
+  store.publish("m", test::tubeModel(), provenance);
+  CHECK(store.publishedBy("m", "abc") == 0);
+  CHECK(store.publishedBy("nobody", "abc") == 0);
+  store.publish("m", test::tubeModel(), {"tubes", provenance.created, "7", "abc"});
+  CHECK(store.publishedBy("m", "abc") == 2);
+  CHECK(store.publishedBy("m", "abd") == 0);
+  CHECK(provenanceOf(store.pin("m", 2)->manifest).job == "7");
 }
 
 TEST_CASE("what is not there is not found") {
