@@ -3,6 +3,7 @@
 #include <catch2/catch.hpp>
 
 #include "core/mesh/alignment.h"
+#include "core/mesh/quality.h"
 #include "core/model/shell_pga_training.h"
 #include "core/numerics/error.h"
 #include "tests/support/shapes.h"
