@@ -2,6 +2,7 @@
 
 #include <sqlite3.h>
 
+#include <cerrno>
 #include <system_error>
 
 #include "core/io/file_error.h"
@@ -17,7 +18,12 @@ int primary(int code) { return code & 0xff; }
 std::string systemReason(sqlite3* handle) {
   if (primary(sqlite3_errcode(handle)) == SQLITE_FULL) return std::generic_category().message(ENOSPC);
   const int error = sqlite3_system_errno(handle);
-  return error == 0 ? sqlite3_errmsg(handle) : std::generic_category().message(error);
+  if (error != 0) return std::generic_category().message(error);
+  // A write that failed half-way has lost its reason: a quota or a size limit (a full disk is SQLITE_FULL), seldom a
+  // broken disk.
+  if (sqlite3_extended_errcode(handle) == SQLITE_IOERR_WRITE)
+    return std::generic_category().message(EFBIG) + ", or the disk is broken";
+  return sqlite3_errmsg(handle);
 }
 
 }  // namespace

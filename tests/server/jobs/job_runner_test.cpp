@@ -64,7 +64,7 @@ std::string crashedJob(const std::filesystem::path& file, int crashes = 0) {
 }
 
 struct Setting {
-  Setting() { startLog("critical"); }  // the failures are what the tests provoke
+  Setting() { startLog("error"); }
   test::TemporaryFolder folder;
   std::filesystem::path file = folder / "jobs.sqlite", jobs = folder / "jobs";
 };

@@ -215,6 +215,7 @@ TEST_CASE("a full disk refuses a change, keeps what was, and the next change suc
     } catch (const FileError& error) {
       told = error.what();
     }
+    INFO(told);
     CHECK(saysDiskFull(told));
     CHECK_THAT(told, Contains("jobs.sqlite"));
     CHECK(registry.get(id).request.size() == 3);
