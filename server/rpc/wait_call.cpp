@@ -15,7 +15,7 @@ WaitCall::WaitCall(Runtime& runtime, JobRegistry& registry, grpc::CallbackServer
                    const v1::WaitJobRequest& request, v1::WaitJobResponse& response, std::stop_token stop)
     : runtime_(runtime),
       registry_(registry),
-      call_(context, "Jobs.Wait", runtime.longest_call),
+      call_(runtime, context, "Jobs.Wait", runtime.longest_call),
       request_(request),
       response_(response),
       stop_(std::move(stop)) {}
