@@ -66,7 +66,7 @@ TEST_CASE("a version tells the job that made it") {
   store.publish("m", test::tubeModel(), {"tubes", provenance.created, "7", "abc"});
   CHECK(store.publishedBy("m", "abc") == 2);
   CHECK(store.publishedBy("m", "abd") == 0);
-  CHECK(provenanceOf(store.pin("m", 2)->manifest).job == "7");
+  CHECK(provenanceOf(pinNow(store, {"m", 2, ""})->manifest).job == "7");
 }
 
 TEST_CASE("what is not there is not found") {

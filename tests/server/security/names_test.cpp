@@ -7,7 +7,7 @@
 #include "core/numerics/error.h"
 #include "server/datasets/dataset_store.h"
 #include "server/errors/errors.h"
-#include "server/jobs/job_registry.h"
+#include "server/jobs/sqlite_job_registry.h"
 #include "server/models/model_store.h"
 #include "tests/support/shapes.h"
 #include "tests/support/temporary_folder.h"
@@ -89,7 +89,8 @@ TEST_CASE("hostile names of datasets reach no file") {
   CHECK(std::filesystem::is_empty(fixture.folder / "datasets"));
 }
 
-TEST_CASE("job ids are numbers in memory") {
-  const MemoryJobRegistry registry;
+TEST_CASE("a job id from a client is looked up, never made a path") {
+  const test::TemporaryFolder folder;
+  const SqliteJobRegistry registry(folder / "jobs.sqlite");
   for (const auto& name : kHostile) CHECK_THROWS_AS(registry.get(name), NotFound);
 }
