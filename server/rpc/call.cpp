@@ -37,6 +37,7 @@ Credentials credentialsOf(const grpc::CallbackServerContext& context) {
 Call::Call(const Runtime& runtime, grpc::CallbackServerContext& context, std::string method,
            std::chrono::duration<double> cap)
     : context_(context),
+      client_deadline_(context.deadline()),
       id_(nextRequestId()),
       method_(std::move(method)),
       client_(runtime.access ? runtime.access->nameOf(credentialsOf(context)) : ""),
@@ -71,7 +72,7 @@ grpc::Status Call::guarded(const std::function<void()>& work) {
 void Call::stop(StopReason reason) {
   // When the client's deadline passes, gRPC reports a cancellation, a little early: the client's clock started first.
   constexpr auto slack = std::chrono::milliseconds(50);
-  const bool late = context_.deadline() - slack <= DeadlineTimer::Clock::now();
+  const bool late = client_deadline_ - slack <= DeadlineTimer::Clock::now();
   stopper_.stop(late ? StopReason::kDeadline : reason);
 }
 
@@ -83,7 +84,7 @@ grpc::Status Call::refusal(const Decision& decision) {
 
 DeadlineTimer::Clock::time_point Call::deadline() const {
   const auto cap = std::chrono::duration_cast<DeadlineTimer::Clock::duration>(cap_);
-  return std::min(context_.deadline(), DeadlineTimer::Clock::now() + cap);
+  return std::min(client_deadline_, DeadlineTimer::Clock::now() + cap);
 }
 
 bool Call::finishOnce(const grpc::Status& status) {

@@ -67,6 +67,8 @@ class Call {
 
  private:
   grpc::CallbackServerContext& context_;
+  // A copy: a timer may still ask when gRPC has freed the context.
+  const DeadlineTimer::Clock::time_point client_deadline_;
   const std::uint64_t id_;
   const std::string method_, client_;
   const std::chrono::duration<double> cap_;

@@ -60,13 +60,14 @@ class ServerStreamCall final : public grpc::ServerWriteReactor<Response>,
   void park(const Waiting& waiting) {
     parking_.enter();
     waiting.then([self = this->shared_from_this()] { self->resume(); });
-    if (call_.stopped()) onStop(StopReason::kClient);  // a stop before enter() found nobody
+    // A stop before enter() found nobody. Who takes the call out here is alone with it: it may have ended otherwise.
+    if (call_.stopped() && parking_.leave()) end(call_.stopStatus());
   }
 
   void resume() {
     if (!parking_.leave()) return;
     pool_.submit(call_.id(), 0, Entry::kContinuation, [self = this->shared_from_this()] { self->work(); });
-    if (call_.stopped()) onStop(StopReason::kClient);
+    if (call_.stopped() && pool_.withdraw(call_.id())) end(call_.stopStatus());
   }
 
   void write(const Response& message) {

@@ -16,7 +16,8 @@ WaitCall::WaitCall(Runtime& runtime, JobRegistry& registry, grpc::CallbackServer
     : runtime_(runtime),
       registry_(registry),
       call_(runtime, context, "Jobs.Wait", runtime.longest_call),
-      request_(request),
+      job_(request.id()),
+      timeout_(request.has_timeout() ? std::optional(request.timeout()) : std::nullopt),
       response_(response),
       stop_(std::move(stop)) {}
 
@@ -24,9 +25,9 @@ void WaitCall::enter() {
   self_ = shared_from_this();
   const auto self = [weak = weak_from_this()] { return weak.lock(); };
   const auto status = call_.guarded([&] {
-    if (request_.timeout().seconds() < 0 || request_.timeout().nanos() < 0)
+    if (timeout_ && (timeout_->seconds() < 0 || timeout_->nanos() < 0))
       throw InvalidInput("timeout", "is negative, want >= 0");
-    listener_ = registry_.listen(request_.id(), [self] {
+    listener_ = registry_.listen(job_, [self] {
       if (const auto call = self()) call->look(Cause::kChange);
     });
   });
@@ -35,7 +36,7 @@ void WaitCall::enter() {
     if (const auto call = self()) call->look(Cause::kTimeUp);
   });
   on_daemon_stops_.emplace(stop_, [self] {
-    if (const auto call = self()) call->end(daemonStops(call->request_.id()));
+    if (const auto call = self()) call->end(daemonStops(call->job_));
   });
   look(Cause::kChange);
 }
@@ -43,10 +44,10 @@ void WaitCall::enter() {
 DeadlineTimer::Clock::time_point WaitCall::until() const {
   // A little before the call's own deadline, so that there is an answer.
   const auto last = call_.deadline() - std::chrono::milliseconds(100);
-  if (!request_.has_timeout()) return last;
+  if (!timeout_) return last;
   constexpr std::int64_t kMostSeconds = 1'000'000'000;  // no overflow of the clock
-  const auto wanted = std::chrono::seconds(std::min(request_.timeout().seconds(), kMostSeconds)) +
-                      std::chrono::nanoseconds(request_.timeout().nanos());
+  const auto wanted =
+      std::chrono::seconds(std::min(timeout_->seconds(), kMostSeconds)) + std::chrono::nanoseconds(timeout_->nanos());
   return std::min(last, DeadlineTimer::Clock::now() + wanted);
 }
 
@@ -54,7 +55,7 @@ DeadlineTimer::Clock::time_point WaitCall::until() const {
 void WaitCall::look(Cause cause) {
   std::optional<JobRecord> record;
   try {
-    record = registry_.get(request_.id());
+    record = registry_.get(job_);
   } catch (...) {
     return end(statusOf(std::current_exception(), StopReason::kNone));
   }

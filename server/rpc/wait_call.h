@@ -37,7 +37,8 @@ class WaitCall final : public grpc::ServerUnaryReactor, public std::enable_share
   Runtime& runtime_;
   JobRegistry& registry_;
   Call call_;
-  const v1::WaitJobRequest& request_;
+  const std::string job_;  // copies: gRPC frees the request while a listener may still look
+  const std::optional<google::protobuf::Duration> timeout_;
   v1::WaitJobResponse& response_;
   const std::stop_token stop_;
   std::shared_ptr<const JobRegistry::Listener> listener_;

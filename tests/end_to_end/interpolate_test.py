@@ -80,7 +80,7 @@ class Interpolate(DaemonCase):
 
     def test_bad_options_are_refused_by_name(self):
         self.refused("--path-steps", "interpolate", self.a, self.b, "--path-steps", -1)
-        self.refused("path_steps: = 5000", "interpolate", self.a, self.b, "--path-steps", 5000)
+        self.refused("path_steps: has 5000 steps", "interpolate", self.a, self.b, "--path-steps", 5000)
         self.refused("times[0]", "interpolate", self.a, self.b, "--frames", 1, "--from", 11)
         self.refused("bending", "interpolate", self.a, self.b, "--bending", -1)
         self.assertEqual(self.shapectl("interpolate", self.a).code, BAD_INPUT)
@@ -117,7 +117,7 @@ class Interpolate(DaemonCase):
         for words in (["describe", "nobody"], ["delete", "nobody"], ["watch", "99"], ["cancel", "99"]):
             self.assertEqual(self.shapectl(*words).json["error"]["kind"], "not_found", words)
         self.assertEqual(self.shapectl("describe", "nobody@3").code, NOT_FOUND)
-        self.refused("a model is NAME or NAME@VERSION", "describe", "nobody@0")
+        self.refused("a model is NAME, NAME@VERSION", "describe", "nobody@0")
 
 
 class Lifecycle(DaemonCase):

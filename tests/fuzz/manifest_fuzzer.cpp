@@ -16,7 +16,7 @@ FUZZ_TARGET(manifest) {
   if (!manifest) return;
   require(manifest->format_version >= 1, "the format version counts from 1");
   shaped::v1::ModelDescription description;
-  toProto(server::ModelStore::Entry{"m", 1, *manifest}, description);
+  toProto(server::ModelStore::Entry{"m", 1, *manifest, server::ModelState::kStored, 0, {}}, description);
   require(description.model().name() == "m", "the description names the model");
   if (!accepted<InvalidInput>([&] { return directory.publish("copy", *manifest, TensorWriter()); })) return;
   const auto back = directory.manifest("copy");
