@@ -8,6 +8,8 @@
 #include "core/io/file.h"
 #include "core/numerics/error.h"
 
+#include <cstdlib>
+
 #include "google/rpc/error_details.pb.h"
 #include "google/rpc/status.pb.h"
 
@@ -105,7 +107,17 @@ std::shared_ptr<grpc::Channel> connect(const ConnectionOptions& options) {
                                                                  tokenBearers(options.token));
 }
 
+const TraceContext& processTrace() {
+  static const TraceContext trace = [] {
+    const char* header = std::getenv("TRACEPARENT");
+    const auto given = parseTraceparent(header ? header : "");
+    return given ? *given : newTrace();
+  }();
+  return trace;
+}
+
 Call::Call(const CallOptions& options) : on_stop_(options.stop, [this] { context_.TryCancel(); }) {
+  context_.AddMetadata(kTraceparent, (options.trace ? *options.trace : processTrace()).child().header());
   if (options.timeout)
     context_.set_deadline(std::chrono::system_clock::now() +
                           std::chrono::duration_cast<std::chrono::system_clock::duration>(*options.timeout));

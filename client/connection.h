@@ -13,6 +13,8 @@
 #include <stop_token>
 #include <string>
 
+#include "trace/trace_context.h"
+
 namespace shaped::client {
 
 /// A call that the daemon (or the way to it) answered with an error.
@@ -52,13 +54,18 @@ struct ConnectionOptions {
 /// machine.
 std::shared_ptr<grpc::Channel> connect(const ConnectionOptions& options);
 
+/// The trace that this process belongs to: the one that the environment's TRACEPARENT names, when it is valid, else one
+/// of its own, for as long as it lives.
+const TraceContext& processTrace();
+
 /// How long calls may take and what aborts them.
 struct CallOptions {
   std::optional<std::chrono::duration<double>> timeout;  ///< of each call; none: the daemon's own limit
   std::stop_token stop;                                  ///< cancels the call on the daemon too
+  std::optional<TraceContext> trace{};                   ///< what the call is made on behalf of; none: processTrace()
 };
 
-/// The context of one call; must outlive it.
+/// The context of one call; must outlive it. Carries a traceparent with a span id of its own.
 class Call {
  public:
   explicit Call(const CallOptions& options);
