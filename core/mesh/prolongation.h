@@ -42,6 +42,9 @@ class Prolongation {
   /// The learned correction, V x 2C, at most 24 entries a row.
   const SparseRows& detail() const { return detail_; }
 
+  /// Memory of the matrices and the factor [bytes].
+  std::size_t bytes() const { return plate_->bytes() + bytesOf(detail_); }
+
  private:
   Coarsening coarsening_;
   std::shared_ptr<const ThinPlate> plate_;

@@ -130,6 +130,11 @@ ThinPlate::ThinPlate(const Topology& fine, const Coarsening& coarsening, const V
     throw InvalidInput("reference", "has triangles too thin to carry detail over from the coarse mesh; repair it");
 }
 
+std::size_t ThinPlate::bytes() const {
+  if (free_.empty()) return 0;
+  return bytesOf(pull_) + bytesOf(factor_.matrixL().nestedExpression());
+}
+
 Vertices ThinPlate::solve(const Vertices& frame) const {
   Vertices shape(static_cast<Eigen::Index>(kept_.size() + free_.size()), 3);
   shape(kept_, Eigen::all) = frame.topRows(static_cast<Eigen::Index>(kept_.size()));

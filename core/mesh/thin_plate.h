@@ -11,6 +11,13 @@ namespace shaped {
 
 using SparseRows = Eigen::SparseMatrix<double, Eigen::RowMajor>;
 
+/// Memory of a sparse matrix's entries and indices [bytes].
+template <int options>
+std::size_t bytesOf(const Eigen::SparseMatrix<double, options>& matrix) {
+  return static_cast<std::size_t>(matrix.nonZeros()) * (sizeof(double) + sizeof(int)) +
+         static_cast<std::size_t>(matrix.outerSize() + 1) * sizeof(int);
+}
+
 /// The fine shape whose Laplacian is the reference's, turned and stretched as the coarse shape around it was, and which
 /// passes through the coarse vertices: argmin over x of |L x - d|^2 in M^-1, x = c on the kept vertices.
 ///
@@ -30,6 +37,9 @@ class ThinPlate {
 
   /// frame: frameVectors of a coarse shape. V x 3. May be called from several threads at once.
   Vertices solve(const Vertices& frame) const;
+
+  /// Memory of the matrix and the factor [bytes].
+  std::size_t bytes() const;
 
  private:
   std::vector<std::int32_t> kept_, free_;  ///< fine vertices

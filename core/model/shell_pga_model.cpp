@@ -28,6 +28,17 @@ std::int32_t largestFaceAt(const Faces& faces, const Vertices& shape, std::int32
   return best;
 }
 
+std::size_t numbersOf(const ShellPga& pga) {
+  auto numbers = pga.mean.size() + pga.eigenvalues.size() + pga.eigenvectors.size();
+  for (const auto& variation : pga.variations) numbers += variation.size();
+  return static_cast<std::size_t>(numbers);
+}
+
+/// Each face with its edges and hinges, and the edges.
+std::size_t bytesOf(const TopologyPtr& topology) {
+  return sizeof(std::int32_t) * (9 * static_cast<std::size_t>(topology->faces().rows()) + 2 * topology->edges().size());
+}
+
 }  // namespace
 
 ShellPgaModel::ShellPgaModel(ShellPgaParts parts)
@@ -37,6 +48,15 @@ ShellPgaModel::ShellPgaModel(ShellPgaParts parts)
       mean_(prolongation_.prolongate(parts_.pga.mean)),
       coarse_reference_(restrictTo(parts_.coarsening, parts_.reference)),
       coarse_template_(restrictTo(parts_.coarsening, parts_.template_shape)) {}
+
+std::size_t ShellPgaModel::bytes() const {
+  std::size_t numbers = 0;
+  for (const auto* shape : {&parts_.template_shape, &parts_.reference, &mean_, &coarse_reference_, &coarse_template_})
+    numbers += static_cast<std::size_t>(shape->size());
+  numbers += 2 * numbersOf(parts_.pga);  // the submanifold has a copy
+  return numbers * sizeof(double) + bytesOf(parts_.topology) + bytesOf(parts_.coarsening.coarse) +
+         bytesOf(parts_.detail) + prolongation_.bytes();
+}
 
 Vertices ShellPgaModel::restrict(const Vertices& shape, const std::string& field) const {
   requireValidShape(topology(), shape, field);
@@ -103,19 +123,6 @@ std::vector<MarkerSite> ShellPgaModel::sitesOf(const MarkerSet& markers) const {
     sites.push_back(siteAt(anchorOfPoint(skin), skin + marker.offset));
   }
   return sites;
-}
-
-std::size_t ShellPgaModel::memoryBytes() const {
-  // Measured on bodies of 1,250 to 13,380 vertices: connectivity with its edges and hinges, prolongation and placements
-  // of a fine vertex; pattern, slots and symbolic factorisation of a coarse one.
-  constexpr std::size_t fine_vertex = 700, coarse_vertex = 16'000;
-  const auto count = [](Eigen::Index numbers) { return static_cast<std::size_t>(numbers) * sizeof(double); };
-  const auto coarse_vertices = static_cast<std::size_t>(parts_.coarsening.coarse->vertexCount());
-  std::size_t bytes =
-      static_cast<std::size_t>(topology().vertexCount()) * fine_vertex + coarse_vertices * coarse_vertex;
-  for (const auto& variation : pga().variations) bytes += count(variation.size());
-  bytes += static_cast<std::size_t>(parts_.detail.nonZeros()) * (sizeof(double) + sizeof(int));
-  return bytes + count(pga().eigenvectors.size());
 }
 
 const ShellStructurePtr& ShellPgaModel::fineStructure() const {

@@ -50,6 +50,8 @@ class ShellPgaModel {
   int modes() const { return pga().modes(); }
   /// Full-resolution Frechet mean, V x 3.
   const Vertices& mean() const { return mean_; }
+  /// Memory of the arrays and of the prolongation's factor [bytes]; without what the first fine request adds.
+  std::size_t bytes() const;
 
   /// The coarse rows of a full-resolution shape. Throws InvalidInput naming `field` when the shape does not fit.
   Vertices restrict(const Vertices& shape, const std::string& field) const;
@@ -60,9 +62,6 @@ class ShellPgaModel {
   Anchor anchorOfVertex(std::int32_t vertex, const std::string& field) const;
   /// Where the markers sit on the coarse mesh. Throws InvalidInput naming markers[i].
   std::vector<MarkerSite> sitesOf(const MarkerSet& markers) const;
-
-  /// Memory that the model takes, about [bytes]: its tensors, and what solvers keep of it.
-  std::size_t memoryBytes() const;
 
   /// Sparsity and symbolic factorisation at full resolution, made at the first call.
   const ShellStructurePtr& fineStructure() const;

@@ -138,7 +138,7 @@ ServedModelPtr ModelStore::read(const Key& key) {
   const auto stored = directory_.load(name, signedVersion(version));
   auto model = loadShellPga(stored);
   warm(*model);
-  const auto bytes = model->memoryBytes();
+  const auto bytes = model->bytes();
   return std::make_shared<const ServedModel>(ServedModel{name, version, stored.manifest, std::move(model), bytes});
 }
 
@@ -276,7 +276,7 @@ std::vector<ServedModelPtr> ModelStore::loaded() const {
 ServedModelPtr ModelStore::publish(const std::string& name, ShellPgaModelPtr model, const Provenance& provenance) {
   const auto version = publishShellPga(directory_, name, *model, toJson(provenance));
   const Key key{name, static_cast<std::uint64_t>(version)};
-  const auto bytes = model->memoryBytes();
+  const auto bytes = model->bytes();
   auto served = std::make_shared<const ServedModel>(
       ServedModel{name, key.second, directory_.manifest(name, version), std::move(model), bytes});
   {

@@ -69,6 +69,19 @@ TEST_CASE("a version tells the job that made it") {
   CHECK(provenanceOf(pinNow(store, {"m", 2, ""})->manifest).job == "7");
 }
 
+TEST_CASE("a store says what it has in memory") {
+  const test::TemporaryFolder folder;
+  publishVersions(folder.path(), 1);
+  ModelStore store(folder.path());
+  CHECK(store.loaded().empty());
+  const auto model = pinNow(store, {"m", 0, ""});
+  REQUIRE(store.loaded() == std::vector{model});
+  CHECK(model->bytes > model->manifest.tensors_bytes / 2);
+  CHECK(model->bytes < 20 * model->manifest.tensors_bytes);
+  store.remove("m", 0);
+  CHECK(store.loaded().empty());
+}
+
 TEST_CASE("what is not there is not found") {
   const test::TemporaryFolder folder;
   ModelStore store(folder.path());
@@ -247,7 +260,7 @@ TEST_CASE("labels stand for versions, for good") {
 
 TEST_CASE("the memory budget drops what was used longest ago, and never what a request holds") {
   const test::TemporaryFolder folder;
-  const auto bytes = test::tubeModel()->memoryBytes();
+  const auto bytes = test::tubeModel()->bytes();
   ModelStore store(folder.path(), {.memory_budget = 2 * bytes + bytes / 2, .loaders = 1});
   for (const auto* name : {"a", "b", "c"}) store.publish(name, test::tubeModel(), provenance);
   REQUIRE(store.loaded().size() == 2);
