@@ -78,6 +78,25 @@ grpc::Status statusOf(const std::exception_ptr& error, StopReason stopped) {
   return statusOf(reportOf(error, stopped));
 }
 
+std::optional<RefusalCause> refusalCauseOf(const std::exception_ptr& error) {
+  const auto diskFull = [](const std::exception& problem) {
+    return saysDiskFull(problem.what()) ? std::optional(RefusalCause::kDisk) : std::nullopt;
+  };
+  try {
+    std::rethrow_exception(error);
+  } catch (const Busy&) {
+    return RefusalCause::kWaitingJobs;
+  } catch (const std::bad_alloc&) {
+    return RefusalCause::kMemory;
+  } catch (const FileError& problem) {
+    return diskFull(problem);
+  } catch (const std::system_error& problem) {
+    return diskFull(problem);
+  } catch (...) {
+    return std::nullopt;
+  }
+}
+
 grpc::Status stoppedStatus(StopReason reason) { return statusOf(stoppedReport(reason)); }
 
 std::string nameOf(grpc::StatusCode code) {

@@ -3,9 +3,11 @@
 #include <grpcpp/support/status.h>
 
 #include <exception>
+#include <optional>
 #include <string>
 
 #include "server/errors/report.h"
+#include "server/scheduling/refusal.h"
 #include "server/scheduling/stopper.h"
 
 namespace shaped::server {
@@ -24,6 +26,9 @@ grpc::Status statusOf(const std::exception_ptr& error, StopReason stopped);
 
 /// The client went away or reads nothing: CANCELLED; time is up: DEADLINE_EXCEEDED.
 grpc::Status stoppedStatus(StopReason reason);
+
+/// Why the request was turned away although nothing was wrong with it; nothing for any other exception.
+std::optional<RefusalCause> refusalCauseOf(const std::exception_ptr& error);
 
 /// Whether a FileError's text gives a full disk, quota or size limit as the system's reason.
 bool saysDiskFull(const std::string& text);

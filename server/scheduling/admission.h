@@ -4,6 +4,8 @@
 #include <cstddef>
 #include <string>
 
+#include "server/scheduling/refusal.h"
+
 namespace shaped::server {
 
 /// How much may wait and stay open at once.
@@ -32,6 +34,7 @@ enum class Entry {
 
 struct Decision {
   bool admitted = true;
+  RefusalCause cause{};                      ///< when refused
   std::string reason;                        ///< for people, when refused
   std::chrono::milliseconds retry_after{0};  ///< when to try again, if refused
 };

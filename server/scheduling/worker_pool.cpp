@@ -54,6 +54,11 @@ void WorkerPool::closeStream() {
   --open_streams_;
 }
 
+AdmissionLimits WorkerPool::limits() const {
+  const std::scoped_lock lock(mutex_);
+  return limits_;
+}
+
 Load WorkerPool::load() const {
   const std::scoped_lock lock(mutex_);
   return loadLocked();

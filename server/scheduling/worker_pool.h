@@ -41,6 +41,7 @@ class WorkerPool {
   Load load() const;
   /// What is admitted from here on.
   void setLimits(const AdmissionLimits& limits);
+  AdmissionLimits limits() const;
 
  private:
   struct Task {

@@ -64,6 +64,17 @@ TEST_CASE("a full disk is a resource, another disk failure is internal") {
   CHECK(statusFor(std::system_error(EACCES, std::generic_category())).error_code() == grpc::INTERNAL);
 }
 
+TEST_CASE("what was turned away for want of something says of what") {
+  const auto cause = [](const auto& error) { return refusalCauseOf(std::make_exception_ptr(error)); };
+  CHECK(cause(Busy("x")) == RefusalCause::kWaitingJobs);
+  CHECK(cause(std::bad_alloc()) == RefusalCause::kMemory);
+  CHECK(cause(FileError("m", std::generic_category().message(ENOSPC))) == RefusalCause::kDisk);
+  CHECK(cause(std::system_error(EDQUOT, std::generic_category())) == RefusalCause::kDisk);
+  CHECK_FALSE(cause(FileError("m", std::generic_category().message(EIO))).has_value());
+  CHECK_FALSE(cause(InvalidInput("faces[3]", "is bad")).has_value());
+  CHECK_FALSE(cause(7).has_value());
+}
+
 TEST_CASE("a stop says who did it") {
   CHECK(statusFor(Stopped(), StopReason::kClient).error_code() == grpc::CANCELLED);
   CHECK(statusFor(Stopped(), StopReason::kDeadline).error_code() == grpc::DEADLINE_EXCEEDED);

@@ -44,6 +44,12 @@ TEST_CASE("admission follows the queue's length and bytes") {
   }
 }
 
+TEST_CASE("a refusal says for want of what") {
+  CHECK(admit(waiting(0, 0, 2), limits, Entry::kStream, 0).cause == RefusalCause::kOpenStreams);
+  CHECK(admit(waiting(3, 30), limits, Entry::kCall, 10).cause == RefusalCause::kQueueLength);
+  CHECK(admit(waiting(1, 900), limits, Entry::kCall, 101).cause == RefusalCause::kQueueBytes);
+}
+
 TEST_CASE("a refusal says when the queue will have drained") {
   Load load = waiting(3, 30);
   load.mean_seconds = 2;
