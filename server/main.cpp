@@ -26,12 +26,19 @@ void reload(server::Daemon& daemon, const std::vector<std::string>& words) try {
   server::logError(std::string("the configuration is not taken over: ") + error.what());
 }
 
+/// What the log still holds is written, whatever ends the program.
+struct StopLogAtExit {
+  ~StopLogAtExit() { server::stopLog(); }
+};
+
 int serve(const server::DaemonOptions& options, const std::vector<std::string>& words) {
-  server::startLog(options.log);
+  const StopLogAtExit stop_log;
+  server::startLog(options.log, options.log_format);
   server::takeGrpcLog();
   server::Daemon daemon(options);
   server::logInfo("listening on " + daemon.address() + ", store " + options.store.string() + ", " +
-                  std::to_string(options.threads) + " threads");
+                  std::to_string(options.threads) + " threads" +
+                  (daemon.scrapeAddress().empty() ? "" : ", metrics on http://" + daemon.scrapeAddress() + "/metrics"));
   while (server::waitForSignal() == server::Signal::kReload) reload(daemon, words);
   server::logInfo("stopping");
   daemon.announceStop();

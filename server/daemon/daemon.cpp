@@ -5,6 +5,8 @@
 #include <grpcpp/server_builder.h>
 
 #include "core/numerics/error.h"
+#include "server/daemon/scrape.h"
+#include "server/daemon/surroundings.h"
 #include "server/jobs/arena.h"
 #include "server/rpc/training.h"
 #include "server/security/limits.h"
@@ -39,18 +41,20 @@ Daemon::Daemon(const DaemonOptions& options)
       models_(options.store / "models", options.models),
       datasets_(options.store / "datasets"),
       job_registry_(options.store / "jobs.sqlite"),
+      metrics_([this] { return surroundings(); }),
       pool_(options.threads, options.admission, alone),
       light_(kLightThreads, options.admission, alone),
       heavy_(1, kHeavyLimits, {}),
       jobs_(job_registry_,
             {{kTrainShellPga,
-              shellPgaTraining({datasets_, models_, std::chrono::duration<double>(options.publish_patience),
+              shellPgaTraining({datasets_, models_, metrics_, std::chrono::duration<double>(options.publish_patience),
                                 std::chrono::duration<double>(options.checkpoint_every)})}},
             jobLimits(options), options.store / "jobs"),
       runtime_{pool_,
                light_,
                heavy_,
                timer_,
+               metrics_,
                std::chrono::duration<double>(options.longest_call),
                kLongestHeavyCall,
                std::chrono::duration<double>(options.write_patience),
@@ -62,8 +66,22 @@ Daemon::Daemon(const DaemonOptions& options)
           runtime_, job_registry_, jobs_,
           [this](const v1::TrainRequest& request) { return startTraining(datasets_, job_registry_, jobs_, request); }),
       shapes_service_(runtime_, options_.limits, models_, datasets_),
-      server_service_(runtime_, options_.limits, "shaped " SHAPED_VERSION) {
+      server_service_(runtime_, options_.limits, "shaped " SHAPED_VERSION),
+      admin_service_(runtime_) {
+  for (const char* service :
+       {v1::Models::service_full_name(), v1::Datasets::service_full_name(), v1::Jobs::service_full_name(),
+        v1::Shapes::service_full_name(), v1::Server::service_full_name(), v1::Admin::service_full_name()})
+    declareMethods(service, metrics_);
+  if (!options.metrics.empty())
+    scrape_ = std::make_unique<HttpListener>("--metrics", options.metrics, scrapeHandler(metrics_, ready_));
   listen(options.listen);
+  ready_ = true;
+}
+
+Surroundings Daemon::surroundings() {
+  return {{poolStatistics("solver", pool_), poolStatistics("light", light_), poolStatistics("heavy", heavy_)},
+          modelMemory(models_),
+          jobCounts(job_registry_)};
 }
 
 void Daemon::listen(const std::string& address) {
@@ -80,7 +98,7 @@ void Daemon::listen(const std::string& address) {
   for (grpc::Service* service :
        {static_cast<grpc::Service*>(&models_service_), static_cast<grpc::Service*>(&datasets_service_),
         static_cast<grpc::Service*>(&jobs_service_), static_cast<grpc::Service*>(&shapes_service_),
-        static_cast<grpc::Service*>(&server_service_)})
+        static_cast<grpc::Service*>(&server_service_), static_cast<grpc::Service*>(&admin_service_)})
     builder.RegisterService(service);
   server_ = builder.BuildAndStart();
   const bool by_port = !address.starts_with("unix:");
@@ -113,6 +131,7 @@ void Daemon::useLimits() {
 }
 
 void Daemon::announceStop() {
+  ready_ = false;
   if (auto* health = server_ ? server_->GetHealthCheckService() : nullptr) health->SetServingStatus(false);
 }
 

@@ -2,6 +2,7 @@
 
 #include <grpcpp/server.h>
 
+#include <atomic>
 #include <memory>
 
 #include "server/daemon/options.h"
@@ -9,12 +10,15 @@
 #include "server/datasets/dataset_store.h"
 #include "server/jobs/job_runner.h"
 #include "server/jobs/sqlite_job_registry.h"
+#include "server/rpc/admin_service.h"
 #include "server/rpc/datasets_service.h"
 #include "server/rpc/jobs_service.h"
 #include "server/rpc/models_service.h"
 #include "server/rpc/server_service.h"
 #include "server/rpc/shapes_service.h"
 #include "server/security/security.h"
+#include "server/telemetry/http_listener.h"
+#include "server/telemetry/metrics.h"
 
 namespace shaped::server {
 
@@ -38,6 +42,8 @@ class Daemon {
   void reload(const DaemonOptions& options);
   /// Health says NOT_SERVING from here on; calls are still answered.
   void announceStop();
+  /// Of the scrape, with the real port; empty when there is none.
+  std::string scrapeAddress() const { return scrape_ ? scrape_->address() : ""; }
   /// Takes no new calls, puts jobs back to go on at the next start, lets running calls go on for `grace`, then cancels
   /// them.
   void shutdown(std::chrono::duration<double> grace);
@@ -45,6 +51,7 @@ class Daemon {
  private:
   void listen(const std::string& address);
   void useLimits();
+  Surroundings surroundings();
 
   DaemonOptions options_;
   Security security_;
@@ -52,6 +59,7 @@ class Daemon {
   ModelStore models_;
   DatasetStore datasets_;
   SqliteJobRegistry job_registry_;
+  Metrics metrics_;
   DeadlineTimer timer_;
   WorkerPool pool_, light_, heavy_;
   JobRunner jobs_;
@@ -61,8 +69,11 @@ class Daemon {
   JobsService jobs_service_;
   ShapesService shapes_service_;
   ServerService server_service_;
+  AdminService admin_service_;
   std::string address_;
+  std::atomic<bool> ready_{false};
   std::unique_ptr<grpc::Server> server_;
+  std::unique_ptr<HttpListener> scrape_;  // last: its thread asks for all of the above
 };
 
 }  // namespace shaped::server

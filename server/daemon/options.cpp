@@ -82,6 +82,17 @@ OptionSpec listenInsecurelyOption() {
           [](const DaemonOptions& options) { return options.security.anywhere ? options.listen : std::string(); }};
 }
 
+OptionSpec logFormatOption() {
+  auto option = textOption(
+      "log-format", "FORMAT", When::kAtStart, [](auto& o) -> auto& { return o.log_format; },
+      "text, or json: one object a line");
+  option.set = [](DaemonOptions& options, const std::string& where, const std::string& value) {
+    requireLogFormat(value, where);
+    options.log_format = value;
+  };
+  return option;
+}
+
 constexpr std::int64_t kMostCount = 1 << 20;
 constexpr double kMostSeconds = 1e6;
 constexpr std::int64_t kMostVertices = 100'000'000;
@@ -163,6 +174,10 @@ std::vector<OptionSpec> makeSpecs() {
           "tokens", "FILE", When::kAtStart, [](auto& o) -> auto& { return o.security.tokens; },
           "serve only clients that this file knows, each as far as its roles allow"),
       listenInsecurelyOption(),
+      logFormatOption(),
+      textOption(
+          "metrics", "HOST:PORT", When::kAtStart, [](auto& o) -> auto& { return o.metrics; },
+          "serves /metrics, /healthz and /readyz over HTTP, to whoever reaches it; off where not given"),
   };
 }
 

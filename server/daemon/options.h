@@ -29,7 +29,9 @@ struct DaemonOptions {
   SecurityOptions security;
   Limits limits;  ///< of requests
   ModelStoreOptions models;
-  std::string log = "info";  ///< debug, info, warn, error
+  std::string log = "info";         ///< debug, info, warn, error
+  std::string log_format = "text";  ///< text, json
+  std::string metrics;              ///< host:port of the scrape's HTTP; empty: none
 };
 
 /// One option: `--name VALUE` on the command line, `name: value` in the configuration file.

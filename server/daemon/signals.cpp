@@ -46,6 +46,8 @@ void catchSignals() {
   action.sa_flags = SA_RESTART;
   for (const int signal : {SIGINT, SIGTERM, SIGHUP}) sigaction(signal, &action, nullptr);
   std::signal(SIGXFSZ, SIG_IGN);
+  // Neither is a reader of the log that has gone.
+  std::signal(SIGPIPE, SIG_IGN);
 }
 
 Signal waitForSignal() {

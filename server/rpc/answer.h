@@ -19,9 +19,10 @@ ServedModelPtr pinModel(ModelStore& store, const Request& request, Call& call) {
 
 /// Fills what every answer carries. Throws Stopped when the solver was cancelled: then there is no answer.
 template <class Response>
-void setAnswer(const ServedModel& model, const Outcome& outcome, double smallest_area_ratio, const Call& call,
+void setAnswer(const ServedModel& model, const Outcome& outcome, double smallest_area_ratio, Call& call,
                Response& response) {
   if (outcome.termination == Termination::kCancelled) throw Stopped();
+  call.solved(outcome);
   response.mutable_model()->set_name(model.name);
   response.mutable_model()->set_version(model.version);
   toProto(outcome, call.workSeconds(), *response.mutable_report());

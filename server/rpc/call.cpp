@@ -32,18 +32,32 @@ Credentials credentialsOf(const grpc::CallbackServerContext& context) {
   return credentials;
 }
 
+/// What the caller says of its trace; nothing when it says nothing, or not exactly one valid thing.
+std::optional<TraceContext> parentOf(const grpc::CallbackServerContext& context) {
+  const auto [first, end] = context.client_metadata().equal_range(kTraceparent);
+  if (first == end || std::next(first) != end) return std::nullopt;
+  return parseTraceparent({first->second.data(), first->second.size()});
+}
+
 }  // namespace
 
 Call::Call(const Runtime& runtime, grpc::CallbackServerContext& context, std::string method,
            std::chrono::duration<double> cap)
     : context_(context),
       client_deadline_(context.deadline()),
+      metrics_(runtime.metrics),
       id_(nextRequestId()),
       method_(std::move(method)),
       client_(runtime.access ? runtime.access->nameOf(credentialsOf(context)) : ""),
+      counts_(runtime.metrics.method(method_)),
+      parent_(parentOf(context)),
+      trace_(parent_ ? parent_->child() : newTrace()),
       cap_(cap),
       arrival_(std::chrono::steady_clock::now()),
-      work_begin_(arrival_) {}
+      work_begin_(arrival_) {
+  counts_.began();
+  context_.AddInitialMetadata(kTraceparent, trace_.header());
+}
 
 void Call::throwIfStopped() const {
   if (stopped()) throw Stopped();
@@ -58,15 +72,26 @@ double Call::workSeconds() const { return secondsSince(work_begin_); }
 
 grpc::Status Call::guarded(const std::function<void()>& work) {
   work_begin_ = std::chrono::steady_clock::now();
+  times_.enter(CallTimes::Phase::kWorking);
+  grpc::Status status;
   try {
     throwIfStopped();
     work();
-    return grpc::Status::OK;
   } catch (const Waiting&) {
+    times_.enter(CallTimes::Phase::kResting);
     throw;
   } catch (...) {
-    return statusOf(std::current_exception(), stopper_.reason());
+    if (const auto cause = refusalCauseOf(std::current_exception())) metrics_.refused(*cause);
+    status = statusOf(std::current_exception(), stopper_.reason());
   }
+  times_.enter(CallTimes::Phase::kResting);
+  return status;
+}
+
+void Call::waitForClient(const std::function<void()>& wait) {
+  times_.enter(CallTimes::Phase::kResting);
+  wait();
+  times_.enter(CallTimes::Phase::kWorking);
 }
 
 void Call::stop(StopReason reason) {
@@ -77,6 +102,7 @@ void Call::stop(StopReason reason) {
 }
 
 grpc::Status Call::refusal(const Decision& decision) {
+  metrics_.refused(decision.cause);
   context_.AddTrailingMetadata("grpc-retry-pushback-ms", std::to_string(decision.retry_after.count()));
   return statusOf(
       ErrorReport{grpc::RESOURCE_EXHAUSTED, decision.reason, Reason::kServerBusy, {}, decision.retry_after});
@@ -89,12 +115,23 @@ DeadlineTimer::Clock::time_point Call::deadline() const {
 
 bool Call::finishOnce(const grpc::Status& status) {
   if (finished_.exchange(true)) return false;
-  CallRecord record{
-      id_, method_, client_, {}, nameOf(status.error_code()), status.error_message(), secondsSince(arrival_)};
+  CallRecord record{.request_id = id_,
+                    .method = method_,
+                    .client = client_,
+                    .model = {},
+                    .outcome = nameOf(status.error_code()),
+                    .message = status.error_message(),
+                    .seconds = secondsSince(arrival_),
+                    .queue_seconds = times_.seconds(CallTimes::Phase::kQueued),
+                    .compute_seconds = times_.seconds(CallTimes::Phase::kWorking),
+                    .peer = context_.peer(),
+                    .trace = trace_,
+                    .parent_id = parent_ ? parent_->span_id : ""};
   {
     const std::scoped_lock lock(model_mutex_);
     record.model = model_;
   }
+  counts_.ended({record.outcome, record.seconds, record.queue_seconds, record.compute_seconds});
   logCall(record, serversFault(status.error_code()));
   return true;
 }

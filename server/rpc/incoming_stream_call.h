@@ -71,6 +71,7 @@ class IncomingStreamCall final : public Reactor,
     if (!ok && context_.IsCancelled()) call_.stop(StopReason::kClient);
     if (call_.stopped()) return end(call_.stopStatus());
     state_ = State::kWorking;
+    call_.queued();
     pool_.submit(call_.id(), ok ? request_.ByteSizeLong() : 0, Entry::kContinuation,
                  [self = this->shared_from_this(), ok] { self->work(ok); });
   }

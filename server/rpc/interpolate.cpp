@@ -26,8 +26,9 @@ void check(const v1::InterpolateRequest& request, const Limits& limits) {
     throw InvalidInput("bending", "= " + std::to_string(request.bending()) + ", want > 0 (m^2), or 0 for the default");
 }
 
-void throwIfCancelled(const Outcome& outcome) {
+void count(const Outcome& outcome, Call& call) {
   if (outcome.termination == Termination::kCancelled) throw Stopped();
+  call.solved(outcome);
 }
 
 v1::InterpolateResponse summaryOf(const GeodesicCalculus& calculus, const Solved<Path>& path, double seconds) {
@@ -58,12 +59,12 @@ void interpolate(const Limits& limits, const v1::InterpolateRequest& request,
   options.stop = call.stopToken();
 
   const auto path = calculus.interpolate(from.vertices, to, steps, options);
-  throwIfCancelled(path);
+  count(path, call);
   write(summaryOf(calculus, path, call.workSeconds()));
   for (int i = 0; i < request.times_size(); ++i) {
     const double begin = call.workSeconds();
     const auto shape = calculus.at(path.solution, request.times(i), options);
-    throwIfCancelled(shape);
+    count(shape, call);
     v1::InterpolateResponse response;
     auto& frame = *response.mutable_frame();
     frame.set_index(static_cast<std::uint32_t>(i));

@@ -39,6 +39,7 @@ class ServerStreamCall final : public grpc::ServerWriteReactor<Response>,
     timer_ = runtime_.timer.schedule(call_.deadline(), [weak = this->weak_from_this()] {
       if (const auto self = weak.lock()) self->onStop(StopReason::kDeadline);
     });
+    call_.queued();
     const auto decision = pool_.submit(call_.id(), request_.ByteSizeLong(), Entry::kCall,
                                        [self = this->shared_from_this()] { self->work(); });
     if (!decision.admitted) end(call_.refusal(decision));
@@ -78,13 +79,14 @@ class ServerStreamCall final : public grpc::ServerWriteReactor<Response>,
     lock.unlock();
     this->StartWrite(&message_);
     lock.lock();
-    const auto taken = [this] { return !writing_; };
-    if (!written_.wait_for(lock, runtime_.write_patience, taken)) {
+    call_.waitForClient([&] {
+      const auto taken = [this] { return !writing_; };
+      if (written_.wait_for(lock, runtime_.write_patience, taken)) return;
       // A worker is worth more than a client who does not read.
       call_.stop(StopReason::kReader);
       context_.TryCancel();
       written_.wait(lock, taken);
-    }
+    });
     if (!arrived_) {
       call_.stop(StopReason::kClient);
       call_.throwIfStopped();

@@ -137,6 +137,7 @@ JobResult train(const TrainingContext& context, const JobRun& run) {
   JobResult result{
       request.model_name(), 0, trained, std::chrono::duration<double>(Clock::now() - begin).count(), 0, {}};
   if (run.stop.stop_requested()) result.outcome.termination = Termination::kCancelled;
+  context.metrics.method("Jobs.Train").solved(result.outcome);
   if (result.outcome.termination == Termination::kCancelled) return result;
   if (trained.solution)
     result.smallest_area_ratio = smallestAreaRatio(set.topology->faces(), set.shapes.front(), trained.solution->mean());

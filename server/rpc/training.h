@@ -5,6 +5,7 @@
 #include "server/datasets/dataset_store.h"
 #include "server/jobs/job_runner.h"
 #include "server/models/model_store.h"
+#include "server/telemetry/metrics.h"
 #include "shaped/v1/jobs.pb.h"
 
 namespace shaped::server {
@@ -15,6 +16,7 @@ inline constexpr const char* kTrainShellPga = "train_shell_pga";
 struct TrainingContext {
   DatasetStore& datasets;
   ModelStore& models;
+  Metrics& metrics;
   std::chrono::duration<double> publish_patience;  ///< how long a finished training waits for a full disk
   std::chrono::duration<double> checkpoint_every;  ///< time between two checkpoints
 };

@@ -35,6 +35,7 @@ class UnaryCall final : public grpc::ServerUnaryReactor,
     timer_ = runtime_.timer.schedule(call_.deadline(), [weak = this->weak_from_this()] {
       if (const auto self = weak.lock()) self->onStop(StopReason::kDeadline);
     });
+    call_.queued();
     const auto decision = pool_.submit(call_.id(), request_.ByteSizeLong(), Entry::kCall,
                                        [self = this->shared_from_this()] { self->work(); });
     if (!decision.admitted) end(call_.refusal(decision));

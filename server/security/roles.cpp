@@ -34,6 +34,7 @@ const std::map<std::string_view, Role>& methods() {
       {"/shaped.v1.Jobs/Wait", Role::kRead},
       {"/shaped.v1.Jobs/Delete", Role::kTrain},
       {"/shaped.v1.Server/GetLimits", Role::kRead},
+      {"/shaped.v1.Admin/GetStatistics", Role::kRead},
       {"/shaped.v1.Shapes/Project", Role::kInfer},
       {"/shaped.v1.Shapes/Synthesize", Role::kInfer},
       {"/shaped.v1.Shapes/Interpolate", Role::kInfer},

@@ -94,13 +94,23 @@ class Layers(unittest.TestCase):
                 if include == "server/jobs/sqlite_job_registry.h":
                     self.assertIn(folder, ("jobs", "daemon"), f"{path.relative_to(ROOT)} knows how jobs are stored")
 
+    def test_traces_stand_alone(self):
+        for path in sources("trace"):
+            for include in includes(path):
+                self.assertNotRegex(include, "^(core|server|client|shaped|grpc)", path)
+
+    def test_telemetry_depends_on_nobody_it_tells_of(self):
+        for path in sources("server/telemetry"):
+            for include in includes(path):
+                self.assertNotRegex(include, "^(grpc|shaped/v1|server/(models|jobs|datasets|rpc|convert|daemon))", path)
+
     def test_the_protocol_stands_alone(self):
         for path in (ROOT / "proto").rglob("*.proto"):
             for name in re.findall(r'^import "([^"]+)"', path.read_text(), re.MULTILINE):
                 self.assertTrue(name.startswith(("shaped/v1/", "google/protobuf/")), f"{path.relative_to(ROOT)} imports {name}")
 
     def test_headers_are_guarded(self):
-        for path in sources("core", "server", "client"):
+        for path in sources("core", "server", "client", "trace"):
             if path.suffix == ".h":
                 self.assertTrue(path.read_text().startswith("#pragma once"), path)
 

@@ -24,13 +24,15 @@ class Daemon:
         self.process = subprocess.Popen(
             [BINARIES / "shaped", "--listen", "127.0.0.1:0", "--store", store, *options],
             stderr=subprocess.PIPE, text=True, preexec_fn=preexec)
-        self.address = None
+        self.address = self.metrics = None
         lines = []
         for line in self.process.stderr:
             lines.append(line)
             found = re.search(r"listening on (\S+),", line)
             if found:
                 self.address = found.group(1)
+                scrape = re.search(r"metrics on (http://\S+)/metrics", line)
+                self.metrics = scrape and scrape.group(1)
                 break
         if self.address is None:
             self.process.stderr.close()

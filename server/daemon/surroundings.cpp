@@ -1,0 +1,50 @@
+#include "server/daemon/surroundings.h"
+
+#include <google/protobuf/descriptor.h>
+
+namespace shaped::server {
+
+std::string nameOf(JobState state) {
+  switch (state) {
+    case JobState::kQueued:
+      return "queued";
+    case JobState::kRunning:
+      return "running";
+    case JobState::kSucceeded:
+      return "succeeded";
+    case JobState::kFailed:
+      return "failed";
+    case JobState::kCancelled:
+      return "cancelled";
+  }
+  return "unknown";
+}
+
+PoolStatistics poolStatistics(const std::string& name, const WorkerPool& pool) {
+  return {name, pool.load(), pool.limits()};
+}
+
+std::vector<ModelMemory> modelMemory(ModelStore& models) {
+  std::vector<ModelMemory> memory;
+  for (const auto& model : models.loaded()) memory.push_back({model->name, model->version, model->shell_pga->bytes()});
+  return memory;
+}
+
+std::map<std::string, std::uint64_t> jobCounts(const JobRegistry& registry) {
+  std::map<std::string, std::uint64_t> counts;
+  for (const auto state :
+       {JobState::kQueued, JobState::kRunning, JobState::kSucceeded, JobState::kFailed, JobState::kCancelled})
+    counts[nameOf(state)] = 0;
+  for (const auto& record : registry.list({.states = {}, .after = {}, .limit = 100'000}))
+    ++counts[nameOf(record.state)];
+  return counts;
+}
+
+void declareMethods(const std::string& service, Metrics& metrics) {
+  const auto* descriptor = google::protobuf::DescriptorPool::generated_pool()->FindServiceByName(service);
+  if (!descriptor) return;
+  for (int i = 0; i < descriptor->method_count(); ++i)
+    metrics.method(descriptor->name() + "." + descriptor->method(i)->name());
+}
+
+}  // namespace shaped::server

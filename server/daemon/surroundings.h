@@ -1,0 +1,22 @@
+#pragma once
+
+#include "server/jobs/job_registry.h"
+#include "server/models/model_store.h"
+#include "server/rpc/call.h"
+#include "server/telemetry/statistics.h"
+
+namespace shaped::server {
+
+/// "queued", "running", "succeeded", "failed", "cancelled".
+std::string nameOf(JobState state);
+
+PoolStatistics poolStatistics(const std::string& name, const WorkerPool& pool);
+std::vector<ModelMemory> modelMemory(ModelStore& models);
+/// Every state, also those that no job is in.
+std::map<std::string, std::uint64_t> jobCounts(const JobRegistry& registry);
+
+/// Makes all methods of a service known, so that their counts begin at 0 and not at their first call.
+/// service: the full name of one that is linked, "shaped.v1.Shapes".
+void declareMethods(const std::string& service, Metrics& metrics);
+
+}  // namespace shaped::server
