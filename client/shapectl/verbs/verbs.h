@@ -28,6 +28,7 @@ Verb evaluateVerb();
 Verb sampleVerb();
 Verb renderVerb();
 Verb tokenVerb();
+Verb topVerb();
 
 /// Every verb, in the order of the help.
 std::vector<Verb> allVerbs();
