@@ -49,7 +49,7 @@ struct Top {
       auto now = client::getStatistics(admin, session.callOptions());
       if (session.json) printJson(toJson(now));
       if (!session.json)
-        for (const auto& line : screenOf(now, before ? &*before : nullptr, session.server)) std::cout << line << "\n";
+        for (const auto& line : screenOf(now, before ? &*before : nullptr, session.connection.server)) std::cout << line << "\n";
       std::cout << std::flush;
       before = std::move(now);
     }
@@ -62,7 +62,7 @@ struct Top {
     LiveScreen screen;
     std::string problem;
     for (std::int64_t i = 1; !session.stop.stop_requested(); ++i) {
-      auto lines = screenOf(*now, before ? &*before : nullptr, session.server);
+      auto lines = screenOf(*now, before ? &*before : nullptr, session.connection.server);
       if (!problem.empty()) lines.insert(lines.begin(), "NO ANSWER (" + problem + "); what follows is old");
       screen.show(lines);
       if (i == count || !waitFor(interval, session.stop)) break;
