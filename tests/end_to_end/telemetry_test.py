@@ -187,7 +187,7 @@ class Log(unittest.TestCase):
         calls = [line for line in lines if " request=" in line]
         self.assertEqual(len(calls), 3, lines)
         self.assertRegex(calls[0], r"^\d{4}-\d\d-\d\dT\d\d:\d\d:\d\d\.\d{3}[+-]\d\d:\d\d info request=1 method=Models.List "
-                         r"model=- outcome=OK seconds=[\d.]+ queue_seconds=[\d.]+ compute_seconds=[\d.]+ peer=ipv4:127.0.0.1:\d+ "
+                         r"client=- model=- outcome=OK seconds=[\d.]+ queue_seconds=[\d.]+ compute_seconds=[\d.]+ peer=ipv4:127.0.0.1:\d+ "
                          f"trace={TRACE}$")
         self.assertIn('message="there is no job \\"a\\nb\\"c\\""', calls[1])
 

@@ -19,6 +19,7 @@ namespace {
 CallRecord record() {
   return {.request_id = 7,
           .method = "Shapes.Project",
+          .client = {},
           .model = "bodies@3",
           .outcome = "OK",
           .message = "",
@@ -69,7 +70,7 @@ class CapturedStderr {
 
 TEST_CASE("a call's text line carries its fields") {
   CHECK(textLine(record()) ==
-        "request=7 method=Shapes.Project model=bodies@3 outcome=OK seconds=0.250000 queue_seconds=0.050000 "
+        "request=7 method=Shapes.Project client=- model=bodies@3 outcome=OK seconds=0.250000 queue_seconds=0.050000 "
         "compute_seconds=0.125000 peer=ipv4:127.0.0.1:53012 trace=4bf92f3577b34da6a3ce929d0e0e4736");
   auto refused = record();
   refused.model = "";
