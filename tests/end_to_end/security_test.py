@@ -214,7 +214,7 @@ class Rotation(SecurityCase):
             self.assertEqual(self.served(address), "new")
             self.assertIsNone(running.poll(), "the call in flight has ended")
         for text in ("is not the key of the first certificate", "holds no certificate", "has expired on",
-                     'certificate "new"'):
+                     'certificate \\"new\\"'):
             self.assertIn(text, self.log)
 
 

@@ -85,7 +85,7 @@ TEST_CASE("a call's JSON line carries its fields") {
                                                       {"level", "info"},
                                                       {"request", 7},
                                                       {"method", "Shapes.Project"},
-                                                      {"model", "bodies@3"},
+                                                      {"client", ""}, {"model", "bodies@3"},
                                                       {"outcome", "OK"},
                                                       {"seconds", 0.25},
                                                       {"queue_seconds", 0.05},
