@@ -97,7 +97,7 @@ constexpr std::int64_t kMostCount = 1 << 20;
 constexpr double kMostSeconds = 1e6;
 constexpr std::int64_t kMostVertices = 100'000'000;
 
-std::vector<OptionSpec> makeSpecs() {
+std::vector<OptionSpec> servingOptions() {
   return {
       textOption(
           "listen", "HOST:PORT", When::kAtStart, [](auto& o) -> auto& { return o.listen; },
@@ -115,6 +115,11 @@ std::vector<OptionSpec> makeSpecs() {
       numberOption(
           "write-patience", "S", When::kAtStart, 0.001, kMostSeconds, [](auto& o) -> auto& { return o.write_patience; },
           "how long a stream waits for a client that takes no more [s]"),
+  };
+}
+
+std::vector<OptionSpec> jobOptions() {
+  return {
       numberOption(
           "publish-patience", "S", When::kAtStart, 0, kMostSeconds, [](auto& o) -> auto& { return o.publish_patience; },
           "how long a trained model waits for room on a full disk [s]"),
@@ -130,6 +135,11 @@ std::vector<OptionSpec> makeSpecs() {
       numberOption(
           "keep-jobs-days", "D", When::kAtStart, 0, 36500, [](auto& o) -> auto& { return o.keep_jobs_days; },
           "for at most so many days; 0: whatever their age"),
+  };
+}
+
+std::vector<OptionSpec> stopAndAdmissionOptions() {
+  return {
       numberOption(
           "drain", "S", When::kWhileRunning, 0, kMostSeconds, [](auto& o) -> auto& { return o.drain; },
           "asked to stop: how long it still answers while health says NOT_SERVING [s]"),
@@ -145,6 +155,11 @@ std::vector<OptionSpec> makeSpecs() {
       countOption(
           "open-streams", "N", When::kWhileRunning, kMostCount,
           [](auto& o) -> auto& { return o.admission.open_streams; }, "streams at a time"),
+  };
+}
+
+std::vector<OptionSpec> limitOptions() {
+  return {
       countOption(
           "model-megabytes", "N", When::kAtStart, kMostCount, [](auto& o) -> auto& { return o.models.memory_budget; },
           "memory for models; those that no request holds are dropped at need [MiB]", 1 << 20),
@@ -160,7 +175,11 @@ std::vector<OptionSpec> makeSpecs() {
       countOption(
           "max-message-megabytes", "N", When::kAtStart, 1024, [](auto& o) -> auto& { return o.limits.message_bytes; },
           "largest message, either way [MiB]", 1 << 20),
-      logLevelOption(),
+  };
+}
+
+std::vector<OptionSpec> securityOptions() {
+  return {
       textOption(
           "tls-cert", "FILE", When::kAtStart, [](auto& o) -> auto& { return o.security.certificates.chain; },
           "certificate chain of the daemon, PEM; with tls-key: serve over TLS. Without, on the loopback only"),
@@ -174,6 +193,12 @@ std::vector<OptionSpec> makeSpecs() {
           "tokens", "FILE", When::kAtStart, [](auto& o) -> auto& { return o.security.tokens; },
           "serve only clients that this file knows, each as far as its roles allow"),
       listenInsecurelyOption(),
+  };
+}
+
+std::vector<OptionSpec> telemetryOptions() {
+  return {
+      logLevelOption(),
       logFormatOption(),
       textOption(
           "metrics", "HOST:PORT", When::kAtStart, [](auto& o) -> auto& { return o.metrics; },
@@ -184,7 +209,13 @@ std::vector<OptionSpec> makeSpecs() {
 }  // namespace
 
 const std::vector<OptionSpec>& optionSpecs() {
-  static const auto specs = makeSpecs();
+  static const auto specs = [] {
+    std::vector<OptionSpec> all;
+    for (auto* group :
+         {servingOptions, jobOptions, stopAndAdmissionOptions, limitOptions, securityOptions, telemetryOptions})
+      for (auto& spec : group()) all.push_back(std::move(spec));
+    return all;
+  }();
   return specs;
 }
 

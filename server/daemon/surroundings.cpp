@@ -26,7 +26,7 @@ PoolStatistics poolStatistics(const std::string& name, const WorkerPool& pool) {
 
 std::vector<ModelMemory> modelMemory(ModelStore& models) {
   std::vector<ModelMemory> memory;
-  for (const auto& model : models.loaded()) memory.push_back({model->name, model->version, model->shell_pga->bytes()});
+  for (const auto& model : models.loaded()) memory.push_back({model->name, model->version, model->bytes});
   return memory;
 }
 

@@ -111,6 +111,7 @@ class IncomingStreamCall final : public Reactor,
     const Lock lock(mutex_);
     if (state_ != State::kParked) return;
     state_ = State::kWorking;
+    call_.queued();
     pool_.submit(call_.id(), 0, Entry::kContinuation, [self = this->shared_from_this()] { self->work(true); });
   }
 

@@ -67,6 +67,7 @@ class ServerStreamCall final : public grpc::ServerWriteReactor<Response>,
 
   void resume() {
     if (!parking_.leave()) return;
+    call_.queued();
     pool_.submit(call_.id(), 0, Entry::kContinuation, [self = this->shared_from_this()] { self->work(); });
     if (call_.stopped() && pool_.withdraw(call_.id())) end(call_.stopStatus());
   }

@@ -61,6 +61,7 @@ class UnaryCall final : public grpc::ServerUnaryReactor,
 
   void resume() {
     if (!parking_.leave()) return;
+    call_.queued();
     pool_.submit(call_.id(), 0, Entry::kContinuation, [self = this->shared_from_this()] { self->work(); });
     if (call_.stopped() && pool_.withdraw(call_.id())) end(call_.stopStatus());
   }
