@@ -32,4 +32,20 @@ ShellPgaModelPtr tubeModel() {
   return model;
 }
 
+ShellPgaTrainingSet fourTubes() {
+  const auto mesh = tube(20, 8);
+  ShellPgaTrainingSet set{mesh.topology, {}, {}};
+  for (const double angle : {-0.9, -0.3, 0.2, 0.8}) set.shapes.push_back(bend(mesh.vertices, angle));
+  set.shapes[1].col(2) *= 1.2;
+  return set;
+}
+
+ShellPgaTrainingOptions smallTraining() {
+  ShellPgaTrainingOptions options;
+  options.modes = 2;
+  options.path_steps = 2;
+  options.coarse_vertices = 60;
+  return options;
+}
+
 }  // namespace shaped::test

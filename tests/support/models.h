@@ -1,6 +1,7 @@
 #pragma once
 
 #include "core/model/shell_pga_model.h"
+#include "core/model/shell_pga_training.h"
 
 namespace shaped::test {
 
@@ -9,5 +10,11 @@ ShellPgaModelPtr tubeModel();
 
 /// A tube of the model's topology, bent by an angle [rad].
 Vertices bentTube(double angle);
+
+/// Four tubes bent by -0.9 to 0.8 radians, one of them wider: a training of a fraction of a second with
+/// smallTraining().
+ShellPgaTrainingSet fourTubes();
+/// J = 2, K = 2, at most 60 coarse vertices.
+ShellPgaTrainingOptions smallTraining();
 
 }  // namespace shaped::test

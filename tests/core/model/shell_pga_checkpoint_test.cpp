@@ -6,6 +6,7 @@
 #include "core/mesh/quality.h"
 #include "core/model/shell_pga_training.h"
 #include "core/numerics/error.h"
+#include "tests/support/models.h"
 #include "tests/support/shapes.h"
 #include "tests/support/temporary_folder.h"
 
@@ -15,26 +16,11 @@ using Catch::Contains;
 
 namespace {
 
-ShellPgaTrainingSet tubes() {
-  const auto mesh = tube(20, 8);
-  ShellPgaTrainingSet set{mesh.topology, {}, {}};
-  for (const double angle : {-0.9, -0.3, 0.2, 0.8}) set.shapes.push_back(bend(mesh.vertices, angle));
-  set.shapes[1].col(2) *= 1.2;
-  return set;
-}
-
-ShellPgaTrainingOptions small() {
-  ShellPgaTrainingOptions options;
-  options.modes = 2;
-  options.path_steps = 2;
-  options.coarse_vertices = 60;
-  return options;
-}
-
 /// All states that a training offers.
 std::vector<ShellPgaCheckpoint> statesOf(const ShellPgaTrainingSet& set, std::stop_token stop = {}) {
   std::vector<ShellPgaCheckpoint> states;
-  trainShellPga(set, small(), {}, std::move(stop), {[&](const auto& state) { states.push_back(state()); }, nullptr});
+  trainShellPga(set, smallTraining(), {}, std::move(stop),
+                {[&](const auto& state) { states.push_back(state()); }, nullptr});
   return states;
 }
 
@@ -47,8 +33,8 @@ ShellPgaCheckpoint throughFile(const ShellPgaCheckpoint& state) {
 }  // namespace
 
 TEST_CASE("a training resumed from any of its checkpoints gives the same model") {
-  const auto set = tubes();
-  const auto whole = trainShellPga(set, small(), {}, {});
+  const auto set = fourTubes();
+  const auto whole = trainShellPga(set, smallTraining(), {}, {});
   REQUIRE(whole.converged());
   const auto states = statesOf(set);
   REQUIRE(states.size() > 4);
@@ -57,7 +43,7 @@ TEST_CASE("a training resumed from any of its checkpoints gives the same model")
   for (const auto& state : states) {
     INFO(state.stage());
     const auto read = throughFile(state);
-    const auto resumed = trainShellPga(set, small(), {}, {}, {{}, &read});
+    const auto resumed = trainShellPga(set, smallTraining(), {}, {}, {{}, &read});
     REQUIRE(resumed.converged());
     CHECK(resumed.iterations == whole.iterations);
     const auto &before = *whole.solution, &after = *resumed.solution;
@@ -69,34 +55,34 @@ TEST_CASE("a training resumed from any of its checkpoints gives the same model")
 }
 
 TEST_CASE("a training that is stopped offers its last iterate") {
-  const auto set = tubes();
+  const auto set = fourTubes();
   std::stop_source stop;
   std::vector<ShellPgaCheckpoint> states;
   const auto sink = [&](const auto& state) {
     states.push_back(state());
     if (states.back().mean.iterations == 1) stop.request_stop();
   };
-  const auto stopped = trainShellPga(set, small(), {}, stop.get_token(), {sink, nullptr});
+  const auto stopped = trainShellPga(set, smallTraining(), {}, stop.get_token(), {sink, nullptr});
   CHECK(stopped.termination == Termination::kCancelled);
   CHECK_FALSE(states.back().mean_ended);
-  const auto resumed = trainShellPga(set, small(), {}, {}, {{}, &states.back()});
+  const auto resumed = trainShellPga(set, smallTraining(), {}, {}, {{}, &states.back()});
   CHECK(resumed.converged());
 }
 
 TEST_CASE("a checkpoint is of one training: of these shapes and options") {
-  const auto state = statesOf(tubes()).front();
-  auto other = tubes();
+  const auto state = statesOf(fourTubes()).front();
+  auto other = fourTubes();
   other.shapes[2](3, 1) += 1e-9;
-  CHECK_THROWS_WITH(trainShellPga(other, small(), {}, {}, {{}, &state}), Contains("another training"));
-  auto options = small();
+  CHECK_THROWS_WITH(trainShellPga(other, smallTraining(), {}, {}, {{}, &state}), Contains("another training"));
+  auto options = smallTraining();
   options.tolerance = 1e-7;
-  CHECK_THROWS_WITH(trainShellPga(tubes(), options, {}, {}, {{}, &state}), Contains("another training"));
-  CHECK(trainingFingerprint(tubes(), small()) == state.training);
+  CHECK_THROWS_WITH(trainShellPga(fourTubes(), options, {}, {}, {{}, &state}), Contains("another training"));
+  CHECK(trainingFingerprint(fourTubes(), smallTraining()) == state.training);
 }
 
 TEST_CASE("a damaged checkpoint is refused wherever the damage is") {
   const TemporaryFolder folder;
-  writeCheckpoint(folder / "c", statesOf(tubes()).back());
+  writeCheckpoint(folder / "c", statesOf(fourTubes()).back());
   const auto bytes = bytesOf(folder / "c");
   for (const std::size_t at : {std::size_t{0}, bytes.size() / 2, bytes.size() - 1, bytes.find("training") + 12}) {
     auto damaged = bytes;
