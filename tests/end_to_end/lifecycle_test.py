@@ -24,13 +24,6 @@ def run(*words):
     return subprocess.run([BINARIES / "shaped", *map(str, words)], capture_output=True, text=True, timeout=30)
 
 
-def wait_for(line, stream):
-    for text in stream:
-        if line in text:
-            return text
-    raise AssertionError(f"the log ended without \"{line}\"")
-
-
 class Lifecycle(unittest.TestCase):
     def setUp(self):
         folder = tempfile.TemporaryDirectory()
@@ -59,17 +52,16 @@ class Lifecycle(unittest.TestCase):
         daemon = self.daemon("--config", self.config)
         self.config.write_text("queue-length: 5\nthreads: 2\n")
         daemon.process.send_signal(signal.SIGHUP)
-        seen = [daemon.process.stderr.readline() for _ in range(3)]
-        self.assertTrue(any("queue-length is now 5\n" in line for line in seen), seen)
-        self.assertTrue(any("threads is now 2 in the configuration: from the next start on" in line for line in seen), seen)
-        self.assertIn("configuration read again", seen[-1])
+        daemon.wait_for("configuration read again")
+        self.assertIn("queue-length is now 5\n", daemon.log)
+        self.assertIn("threads is now 2 in the configuration: from the next start on", daemon.log)
 
     def test_a_faulty_configuration_changes_nothing(self):
         self.config.write_text("queue-length: 9\n")
         daemon = self.daemon("--config", self.config)
         self.config.write_text("queue-length: 0\n")
         daemon.process.send_signal(signal.SIGHUP)
-        line = wait_for("not taken over", daemon.process.stderr)
+        line = daemon.wait_for("not taken over")
         self.assertIn("shaped.yaml:1: queue-length: ", line)
         self.assertEqual(health(daemon.address), SERVING)
 
@@ -78,7 +70,7 @@ class Lifecycle(unittest.TestCase):
         self.assertEqual(health(daemon.address, wait=True), SERVING)
         begin = time.monotonic()
         daemon.process.send_signal(signal.SIGTERM)
-        wait_for("stopping", daemon.process.stderr)
+        daemon.wait_for("stopping")
         time.sleep(0.2)
         self.assertEqual(health(daemon.address), NOT_SERVING)
         self.assertEqual(daemon.process.wait(timeout=20), 0)
@@ -87,7 +79,7 @@ class Lifecycle(unittest.TestCase):
     def test_a_second_signal_ends_the_drain(self):
         daemon = self.daemon("--drain", "600")
         daemon.process.send_signal(signal.SIGTERM)
-        wait_for("stopping", daemon.process.stderr)
+        daemon.wait_for("stopping")
         daemon.process.send_signal(signal.SIGINT)
         self.assertEqual(daemon.process.wait(timeout=20), 0)
 

@@ -7,6 +7,8 @@ import re
 import signal
 import subprocess
 import tempfile
+import threading
+import time
 import unittest
 
 import numpy
@@ -18,37 +20,60 @@ SUCCESS, INTERNAL, BAD_INPUT, NOT_FOUND, UNAVAILABLE, DEADLINE, CANCELLED, NOT_C
 
 
 class Daemon:
-    """A shaped process on a free port of the loopback."""
+    """A shaped process on a free port of the loopback. A thread of its own reads the log, so that no pipe ever fills."""
 
     def __init__(self, store, *options, preexec=None):
+        # Not our standard output: a daemon that outlives a test which ran out of time would keep ctest waiting for its end.
         self.process = subprocess.Popen(
             [BINARIES / "shaped", "--listen", "127.0.0.1:0", "--store", store, *options],
-            stderr=subprocess.PIPE, text=True, preexec_fn=preexec)
-        self.address = self.metrics = None
-        lines = []
-        for line in self.process.stderr:
-            lines.append(line)
-            found = re.search(r"listening on (\S+),", line)
-            if found:
-                self.address = found.group(1)
-                scrape = re.search(r"metrics on (http://\S+)/metrics", line)
-                self.metrics = scrape and scrape.group(1)
-                break
-        if self.address is None:
-            self.process.stderr.close()
-            raise RuntimeError(f"shaped ended with {self.process.wait()}: {' '.join(lines)}")
+            stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, text=True, preexec_fn=preexec)
+        self.log = ""
+        self.reading = threading.Condition()
+        self.reader = threading.Thread(target=self.read, daemon=True)
+        self.reader.start()
+        try:
+            started = self.wait_for("listening on ")
+        except AssertionError as problem:
+            self.process.kill()
+            raise RuntimeError(f"shaped ended with {self.process.wait()}: {self.log}") from problem
+        self.address = re.search(r"listening on (\S+),", started).group(1)
+        scrape = re.search(r"metrics on (http://\S+)/metrics", self.log)
+        self.metrics = scrape and scrape.group(1)
+
+    def read(self):
+        with self.process.stderr as stream:
+            for line in stream:
+                with self.reading:
+                    self.log += line
+                    self.reading.notify_all()
+
+    def wait_for(self, text, timeout=60):
+        """The first line of the log that holds the text, which may come any time until then."""
+        until = time.monotonic() + timeout
+        while True:
+            over = not self.reader.is_alive() or time.monotonic() > until
+            with self.reading:
+                for line in self.log.splitlines(keepends=True):
+                    if text in line and line.endswith("\n"):
+                        return line
+                if over:
+                    raise AssertionError(f"the log has no \"{text}\": {self.log}")
+                self.reading.wait(0.1)
 
     def running(self):
         return self.process.poll() is None
 
     def stop(self, how=signal.SIGTERM):
-        """Ends it, once, and returns (exit code, the rest of its log)."""
-        if self.process.stderr.closed:
-            return self.process.returncode, ""
-        self.process.send_signal(how)
-        log = self.process.stderr.read()
-        self.process.stderr.close()
-        return self.process.wait(timeout=30), log
+        """Ends it, once, and returns (exit code, its whole log)."""
+        if self.running():
+            self.process.send_signal(how)
+            try:
+                self.process.wait(timeout=60)
+            except subprocess.TimeoutExpired:
+                self.process.kill()
+                raise
+        self.reader.join(timeout=10)
+        return self.process.wait(), self.log
 
 
 class Result:

@@ -163,7 +163,7 @@ class Log(unittest.TestCase):
             finally:
                 code, log = daemon.stop()
             self.assertEqual(code, 0)
-            return log.splitlines()
+            return log.splitlines()[1:]
 
     def test_json_lines(self):
         lines = [json.loads(line) for line in self.run_daemon("json")]
