@@ -46,6 +46,7 @@ class Client {
     return ::send(socket_, text.data(), text.size(), MSG_NOSIGNAL) == static_cast<ssize_t>(text.size());
   }
   void endSending() { shutdown(socket_, SHUT_WR); }
+  int socket() const { return socket_; }
   /// What comes until the other side closes, or the time is up.
   std::string receive(std::chrono::milliseconds limit = 5s) {
     std::string text;
@@ -65,18 +66,21 @@ class Client {
   int socket_;
 };
 
-/// An ordinary scrape, which must work whatever others do; returns its answer and checks its time.
+/// An ordinary scrape, which must work whatever others do; its answer, empty when none comes in the time of receive().
 std::string scrape(const HttpListener& listener) {
-  const auto begin = Clock::now();
   Client client(listener);
   client.send(kGet);
-  auto answer = client.receive();
-  CHECK(Clock::now() - begin < 500ms);
-  return answer;
+  return client.receive();
 }
 
+/// For seeing that a client loses its connection.
 HttpLimits quick() {
   return {.head_bytes = 1024, .connections = 8, .read_time = 300ms, .write_time = 300ms, .linger_time = 200ms};
+}
+
+/// For seeing that nobody waits for a client: a listener that did would do so for longer than any scrape here does.
+HttpLimits patient() {
+  return {.head_bytes = 1024, .connections = 8, .read_time = 60s, .write_time = 60s, .linger_time = 60s};
 }
 
 }  // namespace
@@ -99,23 +103,31 @@ TEST_CASE("a request may come in pieces, and its sender may close his side at on
   leaves.send("GET /metr");
   leaves.endSending();
   const auto begin = Clock::now();
-  CHECK(leaves.receive().empty());
-  CHECK(Clock::now() - begin < 1s);
+  CHECK(leaves.receive(5s).empty());
+  CHECK(Clock::now() - begin < 5s);  // at once, not when its time was up
 }
 
-TEST_CASE("who never finishes a request loses the connection and disturbs nobody") {
+TEST_CASE("who never finishes a request loses the connection") {
   const HttpListener listener("--metrics", "127.0.0.1:0", hello, quick());
   Client silent(listener), slow(listener);
   const auto begin = Clock::now();
   bool open = true;
-  while (open && Clock::now() - begin < 5s) {  // a field a moment, for ever
+  while (open && Clock::now() - begin < 20s) {  // a field a moment, for ever
     open = slow.send("X-A: b\r\n");
-    CHECK_THAT(scrape(listener), EndsWith("hello"));
-    std::this_thread::sleep_for(20ms);
+    std::this_thread::sleep_for(5ms);
   }
   CHECK_FALSE(open);
-  CHECK(Clock::now() - begin < 2s);
-  CHECK(silent.receive(2s).empty());
+  CHECK(silent.receive(20s).empty());
+  CHECK(Clock::now() - begin < 20s);
+}
+
+TEST_CASE("who never finishes a request disturbs nobody") {
+  const HttpListener listener("--metrics", "127.0.0.1:0", hello, patient());
+  Client silent(listener), slow(listener);
+  for (int i = 0; i < 20; ++i) {
+    CHECK(slow.send("X-A: b\r\n"));
+    CHECK_THAT(scrape(listener), EndsWith("hello"));
+  }
 }
 
 TEST_CASE("a head without end is refused") {
@@ -129,37 +141,46 @@ TEST_CASE("a head without end is refused") {
   CHECK_THAT(scrape(listener), EndsWith("hello"));
 }
 
-TEST_CASE("who does not read his answer loses the connection and disturbs nobody") {
-  const std::string large(32 << 20, 'x');
-  const HttpListener listener(
-      "--metrics", "127.0.0.1:0",
-      [&](const HttpRequest& request) {
-        return HttpResponse{200, "text/plain", request.path == "/large" ? large : "hello"};
-      },
-      quick());
-  Client stuck(listener, 4096);
-  stuck.send("GET /large HTTP/1.1\r\nHost: x\r\n\r\n");
-  std::this_thread::sleep_for(50ms);
-  CHECK_THAT(scrape(listener), EndsWith("hello"));
-  std::this_thread::sleep_for(500ms);
-  const auto received = stuck.receive();
+TEST_CASE("who does not read his answer loses the connection") {
+  const std::string large(8 << 20, 'x');  // more than sockets hold
+  const auto handler = [&](const HttpRequest&) { return HttpResponse{200, "text/plain", large}; };
+  const HttpListener listener("--metrics", "127.0.0.1:0", handler, quick());
+  // That the listener has given up cannot be seen before one reads, and then it must have; on a busy machine late.
+  std::string received;
+  for (auto pause = 500ms; pause <= 16s; pause *= 2) {
+    Client stuck(listener, 4096);
+    stuck.send(kGet);
+    std::this_thread::sleep_for(pause);
+    received = stuck.receive(20s);
+    if (received.size() < large.size()) break;
+  }
   CHECK(received.size() > 0);
   CHECK(received.size() < large.size());
-  // Whoever reads gets it all.
-  Client reader(listener);
-  reader.send("GET /large HTTP/1.1\r\nHost: x\r\n\r\n");
-  CHECK(reader.receive().size() > large.size());
+}
+
+TEST_CASE("who does not read his answer disturbs nobody, and gets it when he does") {
+  const std::string large(8 << 20, 'x');
+  const auto handler = [&](const HttpRequest& request) {
+    return HttpResponse{200, "text/plain", request.path == "/large" ? large : "hello"};
+  };
+  const HttpListener listener("--metrics", "127.0.0.1:0", handler, patient());
+  Client stuck(listener, 4096);
+  stuck.send("GET /large HTTP/1.1\r\nHost: x\r\n\r\n");
+  pollfd begun{stuck.socket(), POLLIN, 0};
+  REQUIRE(poll(&begun, 1, 20000) == 1);
+  CHECK_THAT(scrape(listener), EndsWith("hello"));
+  CHECK(stuck.receive(60s).size() > large.size());
 }
 
 TEST_CASE("more connections than there may be: the oldest makes room") {
-  const HttpListener listener("--metrics", "127.0.0.1:0", hello, {.connections = 8});
+  const HttpListener listener("--metrics", "127.0.0.1:0", hello, patient());
   std::deque<Client> idle;
   for (int i = 0; i < 200; ++i) {
     idle.emplace_back(listener);
     if (i % 20 == 0) CHECK_THAT(scrape(listener), EndsWith("hello"));
   }
   CHECK_THAT(scrape(listener), EndsWith("hello"));
-  CHECK(idle.front().receive(1s).empty());  // closed long before its time
+  CHECK(idle.front().receive().empty());  // closed long before its time
   idle.back().send(kGet);
   CHECK_THAT(idle.back().receive(), EndsWith("hello"));
 }
@@ -171,7 +192,7 @@ TEST_CASE("the end of the listener waits for nobody") {
   std::this_thread::sleep_for(50ms);
   const auto begin = Clock::now();
   listener.reset();
-  CHECK(Clock::now() - begin < 200ms);
+  CHECK(Clock::now() - begin < 4s);  // they had 5 s
   CHECK(silent.receive(1s).empty());
 }
 
