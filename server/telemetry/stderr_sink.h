@@ -2,6 +2,7 @@
 
 #include <spdlog/details/null_mutex.h>
 #include <spdlog/sinks/base_sink.h>
+#include <sys/types.h>
 
 #include <atomic>
 #include <chrono>
@@ -14,7 +15,8 @@ namespace shaped::server {
 /// before it; once closed it waits a second in all, then drops them.
 class StderrSink final : public spdlog::sinks::base_sink<spdlog::details::null_mutex> {
  public:
-  explicit StderrSink(int descriptor = 2) : descriptor_(descriptor) {}
+  explicit StderrSink(int descriptor = 2);
+  ~StderrSink() override;
   /// From any thread.
   void close();
   /// Lines that were not, or not fully, written.
@@ -26,10 +28,13 @@ class StderrSink final : public spdlog::sinks::base_sink<spdlog::details::null_m
   void sink_it_(const spdlog::details::log_msg& message) override;
   void flush_() override {}
   bool write(std::string_view bytes);
-  /// Whether a piece can be written without blocking.
+  /// As ::write, but never waits where the system lets us say so.
+  ssize_t writeSome(std::string_view bytes) const;
   bool waitUntilWritable() const;
+  bool tooLate() const;
 
   const int descriptor_;
+  const int own_;  ///< another way to the same pipe or terminal, which does not block; -1: there is none
   std::atomic<std::uint64_t> lost_{0};
   std::atomic<Clock::rep> give_up_{Clock::time_point::max().time_since_epoch().count()};
 };
