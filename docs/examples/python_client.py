@@ -1,15 +1,30 @@
 """Lists the models of a daemon, then projects a bent copy of one model's mean and synthesizes the answer again.
 
-    protoc --python_out=OUT -I proto proto/shaped/v1/*.proto
-    PYTHONPATH=OUT python3 docs/examples/python_client.py 127.0.0.1:50051 MODEL
+    protoc --python_out=OUT -I proto proto/shaped/v1/*.proto proto/google/rpc/*.proto
+    PYTHONPATH=OUT python3 docs/examples/python_client.py 127.0.0.1:50051 MODEL [CA.crt TOKEN_FILE]
 """
 
+import pathlib
 import sys
 
 import grpc
 import numpy
 
+from google.rpc import error_details_pb2, status_pb2
 from shaped.v1 import models_pb2, report_pb2, shapes_pb2
+
+# Shapes may be larger than gRPC's default limit of 4 MiB; the daemon tells its own (Server.GetLimits).
+UNLIMITED = [("grpc.max_receive_message_length", -1), ("grpc.max_send_message_length", -1)]
+
+
+def connect(address, ca=None, token=None):
+    """A channel: in the clear, or over TLS to a daemon of the authorities in the file `ca`, with a token for every call."""
+    if ca is None:
+        return grpc.insecure_channel(address, UNLIMITED)
+    credentials = grpc.ssl_channel_credentials(pathlib.Path(ca).read_bytes())
+    if token:
+        credentials = grpc.composite_channel_credentials(credentials, grpc.access_token_call_credentials(token))
+    return grpc.secure_channel(address, credentials, UNLIMITED)
 
 
 def unary(channel, service, method, request, answer_type, timeout=60):
@@ -18,23 +33,37 @@ def unary(channel, service, method, request, answer_type, timeout=60):
     return call(request, timeout=timeout)
 
 
-def main(address, name):
-    # Shapes are larger than gRPC's default limit of 4 MiB may allow.
-    channel = grpc.insecure_channel(address, [("grpc.max_receive_message_length", 64 << 20)])
+def details(error):
+    """The google.rpc details of an error by name: {"ErrorInfo": ..., "BadRequest": ..., "RetryInfo": ...}."""
+    found = {}
+    for key, value in error.trailing_metadata() or ():
+        if key != "grpc-status-details-bin":
+            continue
+        for detail in status_pb2.Status.FromString(value).details:
+            name = detail.TypeName().rsplit(".", 1)[1]
+            message = getattr(error_details_pb2, name)()
+            detail.Unpack(message)
+            found[name] = message
+    return found
+
+
+def bend(positions):
+    """Moves every vertex by a shear that the model can only approximate."""
+    size = positions.max(0) - positions.min(0)
+    return positions + numpy.outer((positions[:, 0] - positions[:, 0].mean()) ** 2, [0, 0.2 / size.max(), 0])
+
+
+def main(address, name, ca=None, token_file=None):
+    channel = connect(address, ca, token_file and pathlib.Path(token_file).read_text().strip())
     for model in unary(channel, "Models", "List", models_pb2.ListModelsRequest(), models_pb2.ListModelsResponse).models:
         print(f"{model.model.name}@{model.model.version}: {model.vertex_count} vertices, {model.shell_pga.modes} modes")
 
     wanted = models_pb2.GetModelRequest(with_mean=True)
     wanted.model.name = name
     got = unary(channel, "Models", "Get", wanted, models_pb2.GetModelResponse)
-    mean = numpy.array(got.mean.positions).reshape(-1, 3)
-
-    # A shear that the model can only approximate.
-    size = mean.max(0) - mean.min(0)
-    sheared = mean + numpy.outer((mean[:, 0] - mean[:, 0].mean()) ** 2, [0, 0.2 / size.max(), 0])
     request = shapes_pb2.ProjectRequest()
     request.model.CopyFrom(wanted.model)
-    request.shape.positions.extend(sheared.ravel())
+    request.shape.positions.extend(bend(numpy.array(got.mean.positions).reshape(-1, 3)).ravel())
     request.shape.topology_id = got.description.topology_id
     projected = unary(channel, "Shapes", "Project", request, shapes_pb2.ProjectResponse)
     print(f"projected: {report_pb2.Termination.Name(projected.report.termination)} in {projected.report.seconds:.2f} s, "
@@ -50,7 +79,7 @@ def main(address, name):
     try:
         unary(channel, "Shapes", "Project", request, shapes_pb2.ProjectResponse)
     except grpc.RpcError as error:
-        print(f"refused: {error.code().name}: {error.details()}")
+        print(f"refused: {error.code().name}: {error.details()} ({details(error)['ErrorInfo'].reason})")
 
 
 if __name__ == "__main__":

@@ -1,14 +1,11 @@
 """The Python example of docs/api.md, run as it says there."""
 
 import os
-import pathlib
 import subprocess
 import sys
 import unittest
 
-from support import SUCCESS, DaemonCase, write_tubes
-
-SOURCE = pathlib.Path(os.environ["SHAPED_SOURCE"])
+from support import SOURCE, SUCCESS, DaemonCase, generate_messages, write_tubes
 
 
 class PythonClient(DaemonCase):
@@ -16,8 +13,7 @@ class PythonClient(DaemonCase):
         self.expect(SUCCESS, "train", "shell-pga", "tubes", *write_tubes(self.folder), "--coarse-vertices", 60)
         messages = self.folder / "messages"
         messages.mkdir()
-        subprocess.run(["protoc", f"--python_out={messages}", "-I", SOURCE / "proto",
-                        *sorted((SOURCE / "proto/shaped/v1").glob("*.proto"))], check=True)
+        generate_messages(messages)
         run = subprocess.run([sys.executable, "-B", SOURCE / "docs/examples/python_client.py", self.daemon.address, "tubes"],
                              env={**os.environ, "PYTHONPATH": str(messages)}, capture_output=True, text=True, timeout=120)
         self.assertEqual(run.returncode, 0, run.stderr)

@@ -14,6 +14,7 @@ import unittest
 import numpy
 
 BINARIES = pathlib.Path(os.environ["SHAPED_BINARIES"])
+SOURCE = pathlib.Path(os.environ["SHAPED_SOURCE"])
 
 # What shapectl returns to the shell, as docs/api.md says.
 SUCCESS, INTERNAL, BAD_INPUT, NOT_FOUND, UNAVAILABLE, DEADLINE, CANCELLED, NOT_CONVERGED = range(8)
@@ -179,3 +180,9 @@ def write_tubes(folder, count=6):
         vertices, faces = tube(angle=-1.2 + 2.4 * i / (count - 1), radius=0.3 + 0.02 * ((i * i) % 5))
         paths.append(write_mesh(folder / f"tube{i}.obj", vertices, faces))
     return paths
+
+
+def generate_messages(folder):
+    """Python's modules of all messages, as docs/api.md makes them."""
+    subprocess.run(["protoc", f"--python_out={folder}", "-I", SOURCE / "proto", *sorted((SOURCE / "proto/shaped/v1").glob("*.proto")),
+                    *sorted((SOURCE / "proto/google/rpc").glob("*.proto"))], check=True)
