@@ -5,6 +5,8 @@
 #include <grpcpp/support/channel_arguments.h>
 #include <grpcpp/support/client_interceptor.h>
 
+#include "client/retries.h"
+#include "client/target.h"
 #include "core/io/file.h"
 #include "core/numerics/error.h"
 
@@ -28,14 +30,6 @@ grpc::SslCredentialsOptions pemTexts(const ConnectionOptions& options) {
 
 std::shared_ptr<grpc::ChannelCredentials> tlsCredentials(const ConnectionOptions& options) {
   return grpc::SslCredentials(pemTexts(options));
-}
-
-/// Whether what is sent there does not leave this machine.
-bool staysHere(const std::string& server) {
-  for (const auto* host : {"localhost:", "[::1]:", "unix:", "unix-abstract:"})
-    if (server.starts_with(host)) return true;
-  // Numbers only: 127.example.org is somewhere else.
-  return server.starts_with("127.") && server.find_first_not_of("0123456789.:") == std::string::npos;
 }
 
 /// Adds the token to a call. gRPC's own call credentials do so over TLS only; the loopback needs none.
@@ -94,16 +88,19 @@ void require(const grpc::Status& status) {
 }
 
 std::shared_ptr<grpc::Channel> connect(const ConnectionOptions& options) {
+  if (!options.token.empty() && !options.encrypted() && !staysHere(options.server))
+    throw InvalidInput("token", "would travel to " + options.server +
+                                    " in the clear, for everybody on the way to read; use TLS (--tls, --ca)");
+  const auto target = targetOf(options.server);
   grpc::ChannelArguments arguments;
   // The daemon has the limits (Server.GetLimits) and says so when a message is too large.
   arguments.SetMaxReceiveMessageSize(-1);
   arguments.SetMaxSendMessageSize(-1);
+  if (!target.authority.empty()) arguments.SetString(GRPC_ARG_DEFAULT_AUTHORITY, target.authority);
+  retryIdempotentCalls(arguments, target.balanced);
   const auto credentials = options.encrypted() ? tlsCredentials(options) : grpc::InsecureChannelCredentials();
-  if (options.token.empty()) return grpc::CreateCustomChannel(options.server, credentials, arguments);
-  if (!options.encrypted() && !staysHere(options.server))
-    throw InvalidInput("token", "would travel to " + options.server +
-                                    " in the clear, for everybody on the way to read; use TLS (--tls, --ca)");
-  return grpc::experimental::CreateCustomChannelWithInterceptors(options.server, credentials, arguments,
+  if (options.token.empty()) return grpc::CreateCustomChannel(target.uri, credentials, arguments);
+  return grpc::experimental::CreateCustomChannelWithInterceptors(target.uri, credentials, arguments,
                                                                  tokenBearers(options.token));
 }
 

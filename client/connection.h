@@ -40,7 +40,7 @@ void require(const grpc::Status& status);
 
 /// How to reach a daemon, and as whom.
 struct ConnectionOptions {
-  std::string server;                      ///< "host:port" or any gRPC target
+  std::string server;                      ///< as targetOf() reads it
   bool tls = false;                        ///< the files below ask for it too
   std::filesystem::path ca;                ///< PEM: whom to trust; empty: the authorities that the system trusts
   std::filesystem::path certificate, key;  ///< PEM: the client's own, both or neither
@@ -49,7 +49,8 @@ struct ConnectionOptions {
   bool encrypted() const { return tls || !ca.empty() || !certificate.empty() || !key.empty(); }
 };
 
-/// Opens a channel to a daemon; connects on first use. Shared by all stubs of a program. Throws InvalidInput naming the
+/// Opens a channel to a daemon; connects on first use. Shared by all stubs of a program. Several replicas take calls in
+/// turn, and calls that change nothing are tried again when a replica dies under them. Throws InvalidInput naming the
 /// file that cannot be read or the option that is missing, and rather than send a token in the clear to another
 /// machine.
 std::shared_ptr<grpc::Channel> connect(const ConnectionOptions& options);

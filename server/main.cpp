@@ -7,6 +7,7 @@
 #include "server/daemon/daemon.h"
 #include "server/daemon/grpc_log.h"
 #include "server/daemon/signals.h"
+#include "server/daemon/supervisor.h"
 #include "server/security/limits.h"
 #include "server/telemetry/call_log.h"
 
@@ -39,8 +40,10 @@ int serve(const server::DaemonOptions& options, const std::vector<std::string>& 
   server::logInfo("listening on " + daemon.address() + ", store " + options.store.string() + ", " +
                   std::to_string(options.threads) + " threads" +
                   (daemon.scrapeAddress().empty() ? "" : ", metrics on http://" + daemon.scrapeAddress() + "/metrics"));
+  server::notifySupervisor("READY=1");
   while (server::waitForSignal() == server::Signal::kReload) reload(daemon, words);
   server::logInfo("stopping");
+  server::notifySupervisor("STOPPING=1");
   daemon.announceStop();
   server::stopSignalWithin(std::chrono::duration<double>(daemon.options().drain));
   daemon.shutdown(std::chrono::duration<double>(daemon.options().grace));

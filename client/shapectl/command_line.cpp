@@ -63,7 +63,7 @@ class CliArguments : public Arguments {
 };
 
 void declareConnection(CLI::App& app, client::ConnectionOptions& connection, std::string& token_file) {
-  app.add_option("--server", connection.server, "The daemon, host:port")
+  app.add_option("--server", connection.server, "The daemon, host:port; replicas with commas between")
       ->envname("SHAPED_SERVER")
       ->capture_default_str();
   app.add_flag("--tls", connection.tls, "Connect over TLS; --ca and --cert imply it")->envname("SHAPED_TLS");

@@ -20,6 +20,12 @@ def health(address, wait=False):
         return channel.unary_unary("/grpc.health.v1.Health/Check")(b"", timeout=5, wait_for_ready=wait)
 
 
+def probe(address):
+    """What a container's health check gets: exit code and words of shapectl health."""
+    done = subprocess.run([BINARIES / "shapectl", "--server", address, "health"], capture_output=True, text=True, timeout=30)
+    return done.returncode, done.stdout
+
+
 def run(*words):
     return subprocess.run([BINARIES / "shaped", *map(str, words)], capture_output=True, text=True, timeout=30)
 
@@ -78,10 +84,17 @@ class Lifecycle(unittest.TestCase):
 
     def test_a_second_signal_ends_the_drain(self):
         daemon = self.daemon("--drain", "600")
+        self.assertEqual(probe(daemon.address), (0, "serving\n"))
         daemon.process.send_signal(signal.SIGTERM)
         daemon.wait_for("stopping")
+        # The signal is logged just before health turns.
+        until = time.monotonic() + 20
+        while probe(daemon.address)[0] == 0 and time.monotonic() < until:
+            time.sleep(0.1)
+        self.assertEqual(probe(daemon.address), (4, "not serving: it is about to stop\n"))
         daemon.process.send_signal(signal.SIGINT)
         self.assertEqual(daemon.process.wait(timeout=20), 0)
+        self.assertEqual(probe(daemon.address)[0], 4)
 
 
 if __name__ == "__main__":

@@ -4,6 +4,8 @@ import json
 import os
 import pathlib
 import re
+import shutil
+import subprocess
 import unittest
 
 import yaml
@@ -81,6 +83,13 @@ class Monitoring(DaemonCase):
         for panel in panels:
             place = panel["gridPos"]
             self.assertLessEqual(place["x"] + place["w"], 24)
+
+    @unittest.skipUnless(shutil.which("promtool"), "promtool (Debian's package prometheus, 332 MB) is not installed")
+    def test_prometheus_itself_takes_them(self):
+        for name in ("prometheus.yml", "prometheus.compose.yml"):
+            checked = subprocess.run(["promtool", "check", "config", FOLDER / name], capture_output=True, text=True, timeout=60)
+            self.assertEqual(checked.returncode, 0, checked.stdout + checked.stderr)
+            self.assertIn("10 rules found", checked.stdout)
 
 
 if __name__ == "__main__":

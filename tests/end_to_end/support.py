@@ -23,10 +23,10 @@ SUCCESS, INTERNAL, BAD_INPUT, NOT_FOUND, UNAVAILABLE, DEADLINE, CANCELLED, NOT_C
 class Daemon:
     """A shaped process on a free port of the loopback. A thread of its own reads the log, so that no pipe ever fills."""
 
-    def __init__(self, store, *options, preexec=None):
+    def __init__(self, store, *options, preexec=None, before=()):
         # Not our standard output: a daemon that outlives a test which ran out of time would keep ctest waiting for its end.
         self.process = subprocess.Popen(
-            [BINARIES / "shaped", "--listen", "127.0.0.1:0", "--store", store, *options],
+            [*before, BINARIES / "shaped", "--listen", "127.0.0.1:0", "--store", store, *options],
             stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, text=True, preexec_fn=preexec)
         self.log = ""
         self.reading = threading.Condition()

@@ -29,6 +29,7 @@ Verb sampleVerb();
 Verb renderVerb();
 Verb tokenVerb();
 Verb topVerb();
+Verb healthVerb();
 
 /// Every verb, in the order of the help.
 std::vector<Verb> allVerbs();

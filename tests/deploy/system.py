@@ -1,0 +1,78 @@
+"""A minimal Debian system, the package, and the skipping of what this machine cannot test."""
+
+import contextlib
+import fcntl
+import os
+import pathlib
+import shutil
+import subprocess
+import sys
+import unittest
+
+SOURCE = pathlib.Path(os.environ["SHAPED_SOURCE"])
+BUILD = pathlib.Path(os.environ["SHAPED_BINARIES"]).parent
+WORK = BUILD / "deploy"
+MIRROR = os.environ.get("SHAPED_DEBIAN_MIRROR", "http://deb.debian.org/debian")
+SOURCES = f"""deb {MIRROR} bookworm main
+deb {MIRROR} bookworm-updates main
+deb {MIRROR}-security bookworm-security main
+"""
+
+# Of one step [s]: a machine that does other things too may take minutes over it.
+PATIENCE = 1200
+
+
+def run(*words, check=True, **options):
+    """Runs a command; what it printed is shown when it fails."""
+    done = subprocess.run(list(map(str, words)), stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True,
+                          timeout=options.pop("timeout", PATIENCE), stdin=subprocess.DEVNULL, **options)
+    if check and done.returncode != 0:
+        raise AssertionError(f"{' '.join(map(str, words))} ended with {done.returncode}:\n{done.stdout[-6000:]}")
+    return done
+
+
+def needs(*programs, root=False):
+    """Skips the test, loudly, where a program is missing."""
+    missing = [f"{name} is not installed" for name in programs if not find(name)]
+    if root and os.geteuid() != 0:
+        missing.append("it takes root")
+    if missing:
+        print(f"\nSKIPPED, so that it is NOT tested: {', '.join(missing)} (deploy/install-deps --all)", file=sys.stderr, flush=True)
+        raise unittest.SkipTest(", ".join(missing))
+
+
+def find(program):
+    return shutil.which(program, path=os.environ.get("PATH", "") + ":/usr/sbin:/sbin")
+
+
+@contextlib.contextmanager
+def alone(name):
+    """One process at a time, of those that share a build folder."""
+    WORK.mkdir(exist_ok=True)
+    with open(WORK / f"{name}.lock", "w") as file:
+        fcntl.flock(file, fcntl.LOCK_EX)
+        yield
+
+
+def base_system():
+    """A folder with Debian 12 and nothing beyond it, made once a build folder."""
+    base = WORK / "base"
+    with alone("base"):
+        if not base.exists():
+            new = WORK / "base.new"
+            shutil.rmtree(new, ignore_errors=True)
+            run("debootstrap", "--variant=minbase", "bookworm", new, MIRROR)
+            (new / "etc/apt/sources.list").write_text(SOURCES)
+            run("chroot", new, "apt-get", "clean")
+            new.rename(base)
+    return base
+
+
+def package():
+    """The Debian package of the programs as they are built, made anew."""
+    with alone("package"):
+        for old in (BUILD / "package").glob("*.deb"):
+            old.unlink()
+        run("cpack", "--config", BUILD / "CPackConfig.cmake", cwd=BUILD)
+        (deb,) = (BUILD / "package").glob("*.deb")
+    return deb
