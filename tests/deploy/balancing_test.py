@@ -15,11 +15,12 @@ import unittest
 
 import grpc
 
-from support import BINARIES, SUCCESS, Daemon, generate_messages, write_tubes
+from support import BINARIES, NOT_CONVERGED, SUCCESS, Daemon, generate_messages, write_tubes
 from system import SOURCE, find, needs, run
 
 FOLDER = SOURCE / "deploy/load-balancing"
-SERVICE_CONFIG = (FOLDER / "service_config.json").read_text()
+ROUND_ROBIN = (FOLDER / "round_robin.json").read_text()
+BEHIND_A_BALANCER = (FOLDER / "behind_a_balancer.json").read_text()
 CALLERS = 6
 PATIENCE = 60  # [s] of every wait and call
 
@@ -36,7 +37,7 @@ def free_port():
 class Load:
     """Callers that call one after the other until they are told to stop; what they met."""
 
-    def __init__(self, target, synthesize, config=SERVICE_CONFIG):
+    def __init__(self, target, synthesize, config):
         self.channel = grpc.insecure_channel(target, [("grpc.service_config", config), ("grpc.use_local_subchannel_pool", 1)])
         self.synthesize, self.stopping = synthesize, threading.Event()
         self.answers, self.failures = 0, []
@@ -124,7 +125,7 @@ class Balancing(unittest.TestCase):
         return sum(count for method in methods if method["method"] == "Shapes.Synthesize"
                    for code, count in method["by_code"].items() if code == "OK")
 
-    def kill_and_restart_under_load(self, target, how, config=SERVICE_CONFIG):
+    def kill_and_restart_under_load(self, target, how, config):
         """What the load met while the first replica ended and came back; both must have had a part of it."""
         before = self.answered(1)
         with Load(target, self.request, config) as load:
@@ -144,10 +145,10 @@ class Balancing(unittest.TestCase):
             self.assertLess(time.monotonic(), until, "it did not happen in time")
             time.sleep(0.2)
 
-    def check(self, target):
+    def check(self, target, config):
         """A crash, then an orderly stop."""
         for how in (signal.SIGKILL, signal.SIGTERM):
-            load = self.kill_and_restart_under_load(target, how)
+            load = self.kill_and_restart_under_load(target, how, config)
             print(f"\n{how.name}: {load.answers} answers, {len(load.failures)} failures", flush=True)
             self.assertEqual(load.failures, [])
 
@@ -155,11 +156,11 @@ class Balancing(unittest.TestCase):
         return "ipv4:" + ",".join(self.address(which) for which in (0, 1))
 
     def test_round_robin_of_a_client(self):
-        self.check(self.both())
+        self.check(self.both(), ROUND_ROBIN)
 
     def test_without_retries_calls_in_flight_fail(self):
         """The control: what the retries are for. And nothing but calls in flight fails."""
-        config = json.loads(SERVICE_CONFIG)
+        config = json.loads(ROUND_ROBIN)
         del config["methodConfig"]
         load = self.kill_and_restart_under_load(self.both(), signal.SIGKILL, json.dumps(config))
         self.assertEqual({code for code, _ in load.failures}, {"UNAVAILABLE"})
@@ -183,7 +184,7 @@ class Balancing(unittest.TestCase):
         finally:
             stopping.set()
             caller.join()
-        self.assertEqual(set(codes), {SUCCESS})
+        self.assertLessEqual(set(codes), {SUCCESS, NOT_CONVERGED})
 
     def configured(self, name):
         """An example configuration with this test's addresses; the port to call, and its path."""
@@ -217,13 +218,13 @@ class Balancing(unittest.TestCase):
         needs("nginx")
         port, path = self.configured("nginx.conf")
         run(find("nginx"), "-t", "-c", path)
-        self.check(self.balancer(port, find("nginx"), "-c", path, "-g", "daemon off;"))
+        self.check(self.balancer(port, find("nginx"), "-c", path, "-g", "daemon off;"), BEHIND_A_BALANCER)
 
     def test_behind_haproxy(self):
         needs("haproxy")
         port, path = self.configured("haproxy.cfg")
         run(find("haproxy"), "-c", "-f", path)
-        self.check(self.balancer(port, find("haproxy"), "-db", "-f", path))
+        self.check(self.balancer(port, find("haproxy"), "-db", "-f", path), BEHIND_A_BALANCER)
 
 
 MAKE_REQUEST = """

@@ -100,9 +100,7 @@ class Image(unittest.TestCase):
         words = [word.replace(":50051", ":0").replace(":9464", ":0") for word in self.config["Entrypoint"] + self.config["Cmd"]]
         process = subprocess.Popen(list(map(str, self.in_image(*words, options=("-v", f"{volume}:/var/lib/shaped")))),
                                    stderr=subprocess.PIPE, text=True)
-        self.addCleanup(process.stderr.close)
-        self.addCleanup(process.wait)
-        self.addCleanup(process.kill)
+        self.addCleanup(self.end, process)
         address = "127.0.0.1:" + self.listening_line(process).split("listening on ")[1].split(",")[0].rsplit(":", 1)[1]
         self.assertEqual(self.health(address).returncode, 0)
         daemon = self.daemon_of(process)
@@ -111,6 +109,14 @@ class Image(unittest.TestCase):
         os.kill(daemon, signal.SIGTERM)
         self.assertEqual(process.wait(timeout=60), 0)
         return address
+
+    def end(self, process):
+        """Whatever still runs of it: buildah passes no signal on."""
+        for each in [*descendants(process.pid), process.pid]:
+            if process.poll() is None:
+                os.kill(each, signal.SIGKILL)
+        process.wait()
+        process.stderr.close()
 
     def listening_line(self, process):
         for line in process.stderr:
