@@ -48,7 +48,10 @@ TEST_CASE("A token stays on this machine only when every replica does", "[client
     INFO(server);
     CHECK_FALSE(staysHere(server));
   }
-  CHECK_THROWS_AS(connect({.server = "127.0.0.1:1,192.0.2.1:2", .token = "secret"}), InvalidInput);
+  ConnectionOptions options;
+  options.server = "127.0.0.1:1,192.0.2.1:2";
+  options.token = "secret";
+  CHECK_THROWS_AS(connect(options), InvalidInput);
 }
 
 TEST_CASE("The service configs for other languages are ours", "[client]") {

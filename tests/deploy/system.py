@@ -69,10 +69,20 @@ def base_system():
 
 
 def package():
-    """The Debian package of the programs as they are built, made anew."""
+    """The Debian package of the programs as they are built; made where it is older than what goes into it."""
     with alone("package"):
-        for old in (BUILD / "package").glob("*.deb"):
-            old.unlink()
-        run("cpack", "--config", BUILD / "CPackConfig.cmake", cwd=BUILD)
-        (deb,) = (BUILD / "package").glob("*.deb")
+        made = list((BUILD / "package").glob("*.deb"))
+        if len(made) != 1 or made[0].stat().st_mtime < latest_change():
+            for old in made:
+                old.unlink()
+            run("cpack", "--config", BUILD / "CPackConfig.cmake", cwd=BUILD)
+            made = list((BUILD / "package").glob("*.deb"))
+    (deb,) = made
     return deb
+
+
+def latest_change():
+    files = [BUILD / "CPackConfig.cmake", BUILD / "bin/shaped", BUILD / "bin/shapectl"]
+    for folder in ("deploy", "docs", "proto"):
+        files += [path for path in (SOURCE / folder).rglob("*") if path.is_file()]
+    return max(path.stat().st_mtime for path in files)
