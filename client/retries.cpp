@@ -8,8 +8,8 @@ namespace {
 // Largest request that is kept [bytes]; what exceeds it is sent once.
 constexpr int kKept = 256 << 20;
 
-/// Calls whose repetition does no harm. Not among them: uploads and Train, Load, SetLabel, Delete and their like, and the
-/// two-way stream, whose answers depend on each other.
+/// Calls whose repetition does no harm. Not among them: uploads and Train, Load, SetLabel, Delete and their like, and
+/// the two-way stream, whose answers depend on each other.
 nlohmann::json idempotentCalls() {
   const auto name = [](const char* service, const char* method) {
     return nlohmann::json{{"service", service}, {"method", method}};

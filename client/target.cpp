@@ -48,18 +48,25 @@ std::vector<std::string> addressesOf(const HostPort& place, int family) {
   return addresses;
 }
 
-/// The addresses of all replicas, with commas between; empty when one has none in the family, which then is `missing`.
-std::string addressList(const std::vector<std::string>& replicas, int family, std::string& missing) {
+/// The addresses of all replicas, with commas between; empty when one has none in the family.
+std::string addressList(const std::vector<std::string>& replicas, int family) {
   std::string list;
   for (const auto& replica : replicas) {
     const auto addresses = addressesOf(hostPortOf(replica), family);
-    if (addresses.empty()) {
-      missing = replica;
-      return "";
-    }
+    if (addresses.empty()) return "";
     for (const auto& address : addresses) list += (list.empty() ? "" : ",") + address;
   }
   return list;
+}
+
+/// Says why the replicas have no addresses of one family.
+[[noreturn]] void throwNoAddresses(const std::vector<std::string>& replicas) {
+  for (const auto& replica : replicas) {
+    const auto place = hostPortOf(replica);
+    if (addressesOf(place, AF_INET).empty() && addressesOf(place, AF_INET6).empty())
+      throw InvalidInput("--server", "\"" + replica + "\" cannot be found");
+  }
+  throw InvalidInput("--server", "names replicas of which some have only IPv4 and some only IPv6 addresses");
 }
 
 bool replicaStaysHere(const std::string& replica) {
@@ -85,11 +92,10 @@ Target targetOf(const std::string& server) {
   if (addresses || server.starts_with("unix") || replicas.size() < 2)
     return {server, addresses || server.starts_with("dns:"), ""};
   // A target of gRPC holds addresses of one family.
-  std::string missing;
   const auto authority = hostPortOf(replicas.front()).host;
-  if (const auto list = addressList(replicas, AF_INET, missing); !list.empty()) return {"ipv4:" + list, true, authority};
-  if (const auto list = addressList(replicas, AF_INET6, missing); !list.empty()) return {"ipv6:" + list, true, authority};
-  throw InvalidInput("--server", "\"" + missing + "\" cannot be found");
+  if (const auto list = addressList(replicas, AF_INET); !list.empty()) return {"ipv4:" + list, true, authority};
+  if (const auto list = addressList(replicas, AF_INET6); !list.empty()) return {"ipv6:" + list, true, authority};
+  throwNoAddresses(replicas);
 }
 
 bool staysHere(const std::string& server) {

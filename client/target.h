@@ -17,7 +17,8 @@ std::vector<std::string> replicasOf(const std::string& server);
 
 /// Reads --server: host:port, any gRPC target, or several host:port with commas between. Several are looked up here and
 /// now, and each must show a certificate for the first one's host; "dns:///host:port" is looked up again and again, and
-/// all its addresses are used. Throws InvalidInput naming the one that cannot be found.
+/// all its addresses are used. Throws InvalidInput naming the one that cannot be found, or when they have no family of
+/// addresses in common.
 Target targetOf(const std::string& server);
 
 /// Whether what is sent there does not leave this machine; of several, all of it.

@@ -38,6 +38,7 @@ TEST_CASE("Several replicas become one target of addresses", "[client]") {
 TEST_CASE("A replica that cannot be is named", "[client]") {
   CHECK_THROWS_WITH(targetOf("127.0.0.1:1,no.such.host.invalid:2"),
                     "--server: \"no.such.host.invalid:2\" cannot be found");
+  CHECK_THROWS_WITH(targetOf("127.0.0.1:1,[::1]:2"), Catch::Contains("some only IPv6"));
   CHECK_THROWS_WITH(targetOf("127.0.0.1:1,127.0.0.1"), "--server: \"127.0.0.1\" is not host:port");
   CHECK_THROWS_WITH(targetOf("127.0.0.1:1,"), "--server: \"\" is not host:port");
 }
