@@ -95,6 +95,14 @@ class Transport(SecurityCase):
         with self.daemon(certificate=self.ours.sign("far", "DNS:far.example")[0], key=self.folder / "far.key") as address:
             self.expect(UNAVAILABLE, 'for other names than "localhost"', address, "models", *self.trusted())
 
+    def test_replicas_show_a_certificate_for_the_first_name(self):
+        certificate, key = self.ours.sign("named", "DNS:localhost")
+        with self.daemon(certificate=certificate, key=key) as one, self.daemon(certificate=certificate, key=key) as two:
+            other = two.replace("localhost", "127.0.0.1")
+            for _ in range(4):
+                self.expect(SUCCESS, "", f"{one},{other}", "models", *self.trusted())
+            self.expect(UNAVAILABLE, "", f"{other},{one}", "models", *self.trusted())
+
     def test_a_daemon_in_the_clear_says_so_to_a_client_with_tls(self):
         with tempfile.TemporaryDirectory() as store:
             daemon = Daemon(store)
