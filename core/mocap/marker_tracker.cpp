@@ -333,6 +333,23 @@ Solved<MarkerFit> MarkerTracker::fit(const MarkerPositions& markers) {
   return {std::move(result), outcome};
 }
 
+MarkerTrackerState MarkerTracker::state() const {
+  return {started_, options_.scale, state_.scale, state_.shape, state_.prior, state_.projection};
+}
+
+void MarkerTracker::resume(MarkerTrackerState state) {
+  const auto vertices = submanifold_->pga().mean.rows();
+  if (state.shape.rows() != vertices || state.prior.rows() != vertices)
+    throw InvalidInput("state", "is of a mesh with another vertex count than the model's");
+  started_ = state.started;
+  options_.scale = state.calibrated;
+  state_ = {};
+  state_.scale = state.scale;
+  state_.shape = std::move(state.shape);
+  state_.prior = std::move(state.prior);
+  state_.projection = std::move(state.projection);
+}
+
 MarkerFit MarkerTracker::report() const {
   const auto& calculus = submanifold_->calculus();
   MarkerFit result;

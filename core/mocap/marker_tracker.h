@@ -50,6 +50,16 @@ struct MarkerFit {
   bool held = false;          ///< too few markers were seen: the last frame's shape is repeated
 };
 
+/// What the next frame of a sequence starts from: all that a tracker needs to go on in another process.
+struct MarkerTrackerState {
+  bool started = false;             ///< the first frame has been fitted
+  std::optional<double> calibrated; ///< the subject's size, where it is settled
+  double scale = 1;                 ///< of the last frame
+  Vertices shape;                   ///< s, unscaled, placed as the scaled-down markers
+  Vertices prior;                   ///< P[s]
+  SubmanifoldProjection projection;
+};
+
 /// Fits a sequence of marker frames by the alternating scheme for (22) of [HZRS18]: s for fixed P[s], then P[s]; each
 /// frame starts from the last one. The first frame, and each that calibrates the size, is placed and scaled by a robust
 /// similarity of the mean's marker points. While a shape has yet to follow its markers, they are judged outliers at
@@ -73,6 +83,12 @@ class MarkerTracker {
   /// Fits the next frame. Throws InvalidInput naming "markers" when the frame has not L rows, or when it is the first
   /// and fewer than three markers, or only markers on one line, were seen.
   Solved<MarkerFit> fit(const MarkerPositions& markers);
+
+  /// Between two frames.
+  MarkerTrackerState state() const;
+  /// Goes on from a state of a tracker with the same submanifold, sites and options, as if it had fitted that one's
+  /// frames. Throws InvalidInput naming "state" when its shapes are of another mesh.
+  void resume(MarkerTrackerState state);
 
  private:
   /// Everything that belongs to the current frame, and what the next one starts from.

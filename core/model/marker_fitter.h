@@ -26,6 +26,10 @@ class MarkerFitter {
   /// Fits the next frame: L x 3 [m], a row of NaN for a marker that was not seen. Throws as MarkerTracker::fit.
   Solved<FittedFrame> fit(const MarkerPositions& markers);
 
+  /// As MarkerTracker::state and MarkerTracker::resume.
+  MarkerTrackerState state() const { return tracker_.state(); }
+  void resume(MarkerTrackerState state) { tracker_.resume(std::move(state)); }
+
  private:
   ShellPgaModelPtr model_;
   MarkerTracker tracker_;

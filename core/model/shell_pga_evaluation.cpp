@@ -61,6 +61,7 @@ class FoldEvaluator {
     const int largest = *std::max_element(modes_.begin(), modes_.end());
     auto pga = principalVariations(calculus_, spider.solution, largest, {100, 1e-8, options_.stop});
     outcome += pga;
+    if (options_.stop.stop_requested()) return outcome;
     const Submanifold submanifold(std::make_shared<GeodesicCalculus>(calculus_),
                                   std::make_shared<ShellPga>(std::move(pga.solution)));
     const auto linear = linearPca(kept);
@@ -133,42 +134,117 @@ double specificity(const ShellPgaModel& model, const std::vector<Vertices>& shap
   return sum / std::max(1, options.specificity_samples);
 }
 
+std::size_t foldsOf(const EvaluationOptions& options, std::size_t shapes) {
+  return options.folds == 0 ? shapes : static_cast<std::size_t>(options.folds);
+}
+
+/// The dimensions to evaluate; throws for options that do not go with the model or so many shapes.
+std::vector<int> checkedModes(const ShellPgaModel& model, std::size_t shapes, const EvaluationOptions& options) {
+  if (shapes < 3) throw InvalidInput("shapes", "evaluation needs at least three");
+  if (options.folds < 0 || options.folds == 1 || options.folds > static_cast<int>(shapes))
+    throw InvalidInput("folds", std::to_string(options.folds) + ", want 0 (leave one out) or 2 to " +
+                                    std::to_string(shapes));
+  const auto folds = foldsOf(options, shapes);
+  const auto smallest_training = static_cast<int>(shapes - (shapes + folds - 1) / folds);
+  if (smallest_training < 2)
+    throw InvalidInput("folds", std::to_string(options.folds) + " leaves one of the " + std::to_string(shapes) +
+                                    " shapes for training, want at least two");
+  return chosenModes(model, options, std::min(model.modes(), smallest_training - 1));
+}
+
+/// One evaluation, stage by stage; what a stop interrupts is not counted as done.
+class Evaluation {
+ public:
+  Evaluation(const ShellPgaModel& model, const std::vector<Vertices>& coarse, const EvaluationOptions& options,
+             const ProgressSink& progress, const ShellPgaEvaluationResumption& resumption, std::vector<int> modes)
+      : model_(model), coarse_(coarse), options_(options), progress_(progress), checkpoint_(resumption.checkpoint) {
+    auto& sums = state_.sums;
+    sums.modes = std::move(modes);
+    sums.generalisation.resize(sums.modes.size());
+    sums.linear.resize(sums.modes.size());
+    sums.compactness = compactness(model.pga().eigenvalues, sums.modes);
+    if (resumption.from) state_ = *resumption.from;
+  }
+
+  Solved<ShellPgaEvaluation> run() {
+    if (!state_.spider) findMean();
+    const auto folds = static_cast<int>(foldsOf(options_, coarse_.size()));
+    while (!stopped() && state_.folds < folds) leaveOut(folds);
+    while (!stopped() && state_.sums.specificity.size() < state_.sums.modes.size()) sample();
+    if (stopped()) state_.outcome.termination = Termination::kCancelled;
+    return {std::move(state_.sums), state_.outcome};
+  }
+
+ private:
+  bool stopped() const { return options_.stop.stop_requested(); }
+  void report(const std::string& stage, double fraction) const {
+    if (progress_) progress_({stage, fraction, 0});
+  }
+  void keep() const {
+    if (checkpoint_) checkpoint_(state_);
+  }
+
+  void findMean() {
+    auto spider = frechetMean(model_.submanifold().calculus(), coarse_,
+                              {model_.pga().path_steps, 100, 1e-8, options_.stop, {}, nullptr});
+    state_.outcome = spider;
+    if (stopped()) return;
+    state_.spider = std::move(spider.solution);
+    keep();
+  }
+
+  void leaveOut(int folds) {
+    report("fold " + std::to_string(state_.folds + 1) + " of " + std::to_string(folds),
+           0.1 + 0.8 * static_cast<double>(state_.folds) / folds);
+    auto sums = state_.sums;
+    const FoldEvaluator evaluator(model_, coarse_, *state_.spider, sums.modes, options_);
+    const auto outcome =
+        evaluator.run(static_cast<std::size_t>(state_.folds), static_cast<std::size_t>(folds), sums);
+    if (stopped()) return;
+    state_.outcome += outcome;
+    state_.sums = std::move(sums);
+    ++state_.folds;
+    keep();
+  }
+
+  void sample() {
+    auto& done = state_.sums.specificity;
+    const auto& modes = state_.sums.modes;
+    report("random shapes, dimension " + std::to_string(modes[done.size()]),
+           0.9 + 0.1 * static_cast<double>(done.size()) / static_cast<double>(modes.size()));
+    const double value = specificity(model_, coarse_, modes[done.size()], options_);
+    if (stopped()) return;
+    done.push_back(value);
+    keep();
+  }
+
+  const ShellPgaModel& model_;
+  const std::vector<Vertices>& coarse_;
+  const EvaluationOptions& options_;
+  const ProgressSink& progress_;
+  const std::function<void(const ShellPgaEvaluationState&)>& checkpoint_;
+  ShellPgaEvaluationState state_;
+};
+
 }  // namespace
 
-Solved<ShellPgaEvaluation> evaluate(const ShellPgaModel& model, const std::vector<Vertices>& shapes,
-                                    const EvaluationOptions& options, const ProgressSink& progress) {
-  if (shapes.size() < 3) throw InvalidInput("shapes", "evaluation needs at least three");
-  if (options.folds < 0 || options.folds == 1 || options.folds > static_cast<int>(shapes.size()))
-    throw InvalidInput(
-        "folds", std::to_string(options.folds) + ", want 0 (leave one out) or 2 to " + std::to_string(shapes.size()));
-  const std::size_t folds = options.folds == 0 ? shapes.size() : static_cast<std::size_t>(options.folds);
-  const auto smallest_training = static_cast<int>(shapes.size() - (shapes.size() + folds - 1) / folds);
-  if (smallest_training < 2)
-    throw InvalidInput("folds", std::to_string(options.folds) + " leaves one of the " + std::to_string(shapes.size()) +
-                                    " shapes for training, want at least two");
-  ShellPgaEvaluation result;
-  result.modes = chosenModes(model, options, std::min(model.modes(), smallest_training - 1));
-  result.generalisation.resize(result.modes.size());
-  result.linear.resize(result.modes.size());
-  result.compactness = compactness(model.pga().eigenvalues, result.modes);
+std::string ShellPgaEvaluationState::stage() const {
+  if (!sums.specificity.empty()) return "folds done, specificity of " + std::to_string(sums.specificity.size());
+  return folds == 0 ? "mean of all shapes done" : "fold " + std::to_string(folds) + " done";
+}
 
+void requireEvaluable(const ShellPgaModel& model, std::size_t shapes, const EvaluationOptions& options) {
+  checkedModes(model, shapes, options);
+}
+
+Solved<ShellPgaEvaluation> evaluate(const ShellPgaModel& model, const std::vector<Vertices>& shapes,
+                                    const EvaluationOptions& options, const ProgressSink& progress,
+                                    const ShellPgaEvaluationResumption& resumption) {
+  auto modes = checkedModes(model, shapes.size(), options);
   std::vector<Vertices> coarse;
   for (std::size_t i = 0; i < shapes.size(); ++i)
     coarse.push_back(model.restrict(shapes[i], "shapes[" + std::to_string(i) + "]"));
-  const auto spider = frechetMean(model.submanifold().calculus(), coarse,
-                                  {model.pga().path_steps, 100, 1e-8, options.stop, {}, nullptr});
-  Outcome outcome = spider;
-  const FoldEvaluator evaluator(model, coarse, spider.solution, result.modes, options);
-  for (std::size_t fold = 0; fold < folds && !options.stop.stop_requested(); ++fold) {
-    if (progress)
-      progress({"fold " + std::to_string(fold + 1) + " of " + std::to_string(folds),
-                0.1 + 0.8 * static_cast<double>(fold) / static_cast<double>(folds), 0});
-    outcome += evaluator.run(fold, folds, result);
-  }
-  for (const int modes : result.modes)
-    if (!options.stop.stop_requested()) result.specificity.push_back(specificity(model, coarse, modes, options));
-  if (options.stop.stop_requested()) outcome.termination = Termination::kCancelled;
-  return {std::move(result), outcome};
+  return Evaluation(model, coarse, options, progress, resumption, std::move(modes)).run();
 }
 
 }  // namespace shaped

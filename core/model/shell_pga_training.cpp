@@ -71,11 +71,28 @@ Solved<Spider> trainMean(const GeodesicCalculus& calculus, const std::vector<Ver
   if (checkpoint)
     mean_options.on_iterate = [&](const Outcome& outcome, const std::function<Spider()>& iterate) {
       checkpoint([&] {
-        return ShellPgaCheckpoint{state.training, state.coarsening, iterate(), soFar(outcome), false};
+        return ShellPgaCheckpoint{state.training, state.coarsening, iterate(), soFar(outcome), false, {}};
       });
     };
   auto mean = frechetMean(calculus, coarse, mean_options);
   return {std::move(mean.solution), soFar(mean)};
+}
+
+/// The principal variations, begun or resumed; every item that is done is offered.
+Solved<ShellPga> trainVariations(const GeodesicCalculus& calculus, const Spider& spider, int modes,
+                                 ShellPgaCheckpoint& state, const CheckpointSink& checkpoint,
+                                 const ProgressSink& progress, const std::stop_token& stop) {
+  const auto from = std::move(state.variations);
+  const auto on_item = [&](const VariationsProgress& done) {
+    report(progress, stageOf(done), 0.75 + 0.15 * shareOf(done));
+    if (!checkpoint) return;
+    checkpoint([&] {
+      auto reached = state;
+      reached.variations = done;
+      return reached;
+    });
+  };
+  return principalVariations(calculus, spider, modes, {100, 1e-8, stop}, {&from, on_item});
 }
 
 }  // namespace
@@ -111,7 +128,7 @@ Solved<ShellPgaModelPtr> trainShellPga(const ShellPgaTrainingSet& set, const She
   requireShapes(set);
   if (const auto violation = options.firstViolation(static_cast<int>(set.shapes.size())))
     throw InvalidInput("options", *violation);
-  ShellPgaCheckpoint state{trainingFingerprint(set, options), {}, {}, {}, false};
+  ShellPgaCheckpoint state{trainingFingerprint(set, options), {}, {}, {}, false, {}};
   if (resumption.from && resumption.from->training != state.training)
     throw InvalidInput("checkpoint", "is of another training");
   if (resumption.from) state = *resumption.from;
@@ -148,7 +165,7 @@ Solved<ShellPgaModelPtr> trainShellPga(const ShellPgaTrainingSet& set, const She
   keep();
   if (stop.stop_requested()) return {nullptr, cancelled};
   report(progress, "principal variations", 0.75);
-  auto pga = principalVariations(calculus, spider.solution, options.modes, {100, 1e-8, stop});
+  auto pga = trainVariations(calculus, spider.solution, options.modes, state, resumption.checkpoint, progress, stop);
   if (stop.stop_requested()) return {nullptr, cancelled};
   parts.training.variations = pga;
   parts.pga = std::move(pga.solution);

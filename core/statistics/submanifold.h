@@ -22,7 +22,7 @@ struct SubmanifoldProjection {
   Vertices shape;       ///< P[s] (20), in no particular position
   Vertices local;       ///< P_loc[s_loc] (18)
   Path geodesic;        ///< from the mean to s
-  double local_energy;  ///< W[s_loc, P_loc[s_loc]] [m^2]
+  double local_energy = 0;  ///< W[s_loc, P_loc[s_loc]] [m^2]
 };
 
 struct SubmanifoldOptions {

@@ -3,9 +3,12 @@
 #include <catch2/catch.hpp>
 
 #include "core/mesh/quality.h"
+#include "core/model/marker_fitter_checkpoint.h"
+#include "core/numerics/error.h"
 #include "core/model/shell_pga_tasks.h"
 #include "tests/support/models.h"
 #include "tests/support/shapes.h"
+#include "tests/support/temporary_folder.h"
 
 using namespace shaped;
 using namespace shaped::test;
@@ -71,4 +74,42 @@ TEST_CASE("markers that do not fit the model are refused by name") {
   set.markers[3].face = 9999;
   CHECK_THROWS_WITH(MarkerFitter(tubeModel(), set, {}), Catch::Contains("markers[3]") && Catch::Contains("face 9999"));
   CHECK_THROWS_WITH(MarkerFitter(tubeModel(), markersAt({1, 2}), {}), Catch::Contains("at least three"));
+}
+
+TEST_CASE("a take that goes on from a checkpoint after any frame is fitted as if it had not been interrupted") {
+  std::vector<MarkerPositions> frames;
+  for (const double angle : {0.5, 0.45, 0.4, 0.3}) frames.push_back(modelShape(angle)(kVertices, Eigen::all));
+  frames[2].topRows(16).setConstant(std::nan(""));  // held
+  const auto begin = [&] {
+    MarkerFitter fitter(tubeModel(), markersAt(kVertices), {});
+    fitter.calibrate({frames[1]});
+    return fitter;
+  };
+  std::vector<FittedFrame> whole;
+  auto one = begin();
+  for (const auto& frame : frames) whole.push_back(one.fit(frame).solution);
+  REQUIRE(whole[2].fit.held);
+
+  const TemporaryFolder folder;
+  for (std::size_t done = 0; done < frames.size(); ++done) {
+    INFO(done << " frames before the interruption");
+    auto before = begin();
+    for (std::size_t i = 0; i < done; ++i) before.fit(frames[i]);
+    writeFitterCheckpoint(folder / "c", {static_cast<std::int64_t>(done), before.state()});
+    const auto read = readFitterCheckpoint(folder / "c");
+    CHECK(read.frames == static_cast<std::int64_t>(done));
+    MarkerFitter after(tubeModel(), markersAt(kVertices), {});
+    after.resume(read.state);
+    for (std::size_t i = done; i < frames.size(); ++i) {
+      const auto fit = after.fit(frames[i]).solution;
+      CHECK(fit.shape == whole[i].shape);
+      CHECK(fit.fit.scale == whole[i].fit.scale);
+      CHECK(fit.fit.point.alpha == whole[i].fit.point.alpha);
+    }
+  }
+  MarkerTrackerState foreign;
+  CHECK_THROWS_WITH(one.resume(foreign), Catch::Contains("state"));
+  auto bytes = bytesOf(folder / "c");
+  bytes[bytes.size() / 2] ^= 1;
+  CHECK_THROWS_AS(readFitterCheckpoint(folder.file("damaged", bytes)), InvalidInput);
 }

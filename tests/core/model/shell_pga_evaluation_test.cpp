@@ -4,6 +4,7 @@
 
 #include "core/numerics/error.h"
 #include "tests/support/models.h"
+#include "tests/support/temporary_folder.h"
 
 using namespace shaped;
 using namespace shaped::test;
@@ -52,6 +53,47 @@ TEST_CASE("fewer folds leave more shapes out of each training") {
   options.folds = 0;
   const auto single = evaluate(model, tubes(), options, {});
   CHECK(halves.solution.generalisation[0].elastic != single.solution.generalisation[0].elastic);
+}
+
+TEST_CASE("an evaluation resumed from any of its states gives the same numbers, bit by bit") {
+  const auto& model = *tubeModel();
+  std::vector<ShellPgaEvaluationState> states;
+  const auto whole = evaluate(model, tubes(), brief(), {}, {[&](const auto& state) { states.push_back(state); }, {}});
+  REQUIRE(states.size() == 1 + 5 + 2);  // the mean, five folds, two dimensions
+  const TemporaryFolder folder;
+  for (const auto& state : states) {
+    INFO(state.stage());
+    writeEvaluationState(folder / "s", state);
+    const auto read = readEvaluationState(folder / "s");
+    int offered = 0;
+    const auto resumed = evaluate(model, tubes(), brief(), {}, {[&](const auto&) { ++offered; }, &read});
+    CHECK(resumed.iterations == whole.iterations);
+    CHECK(resumed.residual == whole.residual);
+    CHECK(resumed.solution.specificity == whole.solution.specificity);
+    for (std::size_t m = 0; m < 2; ++m) {
+      CHECK(resumed.solution.generalisation[m].elastic == whole.solution.generalisation[m].elastic);
+      CHECK(resumed.solution.linear[m].vertex == whole.solution.linear[m].vertex);
+    }
+    CHECK(offered == std::ssize(states) - 1 - (&state - states.data()));  // what is left to do
+  }
+  auto bytes = bytesOf(folder / "s");
+  bytes[bytes.size() - 3] ^= 1;
+  CHECK_THROWS_WITH(readEvaluationState(folder.file("damaged", bytes)), Catch::Contains("damaged"));
+}
+
+TEST_CASE("an evaluation that is stopped has not done the fold it was at") {
+  const auto& model = *tubeModel();
+  std::stop_source stop;
+  auto options = brief();
+  options.stop = stop.get_token();
+  ShellPgaEvaluationState last;
+  const auto stopped = evaluate(model, tubes(), options,
+                                [&](const Progress& progress) {
+                                  if (progress.stage == "fold 3 of 5") stop.request_stop();
+                                },
+                                {[&](const auto& state) { last = state; }, nullptr});
+  CHECK(stopped.termination == Termination::kCancelled);
+  CHECK(last.folds == 2);
 }
 
 TEST_CASE("evaluations that cannot be made are refused by name") {
