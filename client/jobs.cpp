@@ -2,6 +2,15 @@
 
 namespace shaped::client {
 
+v1::Job getJob(v1::Jobs::Stub& jobs, const std::string& id, const CallOptions& options) {
+  Call call(options);
+  v1::GetJobRequest request;
+  request.set_id(id);
+  v1::GetJobResponse response;
+  require(jobs.Get(call.context(), request, &response));
+  return response.job();
+}
+
 v1::Job watchJob(v1::Jobs::Stub& jobs, const std::string& id, const CallOptions& options,
                  const std::function<void(const v1::Job&)>& update) {
   Call call(options);
@@ -12,6 +21,68 @@ v1::Job watchJob(v1::Jobs::Stub& jobs, const std::string& id, const CallOptions&
   while (stream->Read(&response)) update(response.job());
   require(stream->Finish());
   return response.job();
+}
+
+v1::Job startEvaluation(v1::Jobs::Stub& jobs, const v1::EvaluateJobRequest& request, const CallOptions& options) {
+  Call call(options);
+  v1::EvaluateJobResponse response;
+  require(jobs.Evaluate(call.context(), request, &response));
+  return response.job();
+}
+
+v1::Job startProjection(v1::Jobs::Stub& jobs, const v1::ProjectJobRequest& request, const CallOptions& options) {
+  Call call(options);
+  v1::ProjectJobResponse response;
+  require(jobs.Project(call.context(), request, &response));
+  return response.job();
+}
+
+v1::Job startMarkerFit(v1::Jobs::Stub& jobs, const v1::FitMarkersJobRequest::Header& header, const MarkerFrames& frames,
+                       const CallOptions& options, const std::function<void(std::int64_t)>& progress) {
+  Call call(options);
+  v1::FitMarkersJobResponse response;
+  const auto writer = jobs.FitMarkers(call.context(), &response);
+  v1::FitMarkersJobRequest message;
+  *message.mutable_header() = header;
+  // A failed write means that the daemon has already answered: Finish tells what.
+  bool open = writer->Write(message);
+  std::int64_t sent = 0;
+  for (const auto number : frames.numbers) {
+    if (!open) break;
+    *message.mutable_frame() = packFrame(frames, number);
+    open = writer->Write(message);
+    progress(++sent);
+  }
+  writer->WritesDone();
+  require(writer->Finish());
+  return response.job();
+}
+
+void fetchResult(v1::Jobs::Stub& jobs, const std::string& id, const CallOptions& options,
+                 const std::function<void(const v1::GetJobResultResponse&)>& answer) {
+  v1::GetJobResultRequest request;
+  request.set_id(id);
+  while (true) {
+    Call call(options);
+    const auto before = request.skip();
+    const auto stream = jobs.GetResult(call.context(), request);
+    v1::GetJobResultResponse response;
+    try {
+      while (stream->Read(&response)) {
+        answer(response);
+        request.set_skip(request.skip() + 1);
+      }
+    } catch (...) {
+      call.context()->TryCancel();
+      stream->Finish();
+      throw;
+    }
+    const auto status = stream->Finish();
+    // The server's cap on a call's time, or a connection that broke; our own deadline is meant.
+    const bool cut_off = status.error_code() == grpc::UNAVAILABLE ||
+                         (status.error_code() == grpc::DEADLINE_EXCEEDED && !options.timeout);
+    if (!cut_off || request.skip() == before) return require(status);
+  }
 }
 
 v1::Job cancelJob(v1::Jobs::Stub& jobs, const std::string& id, const CallOptions& options) {

@@ -54,7 +54,7 @@ nlohmann::json toJson(const v1::Job& job) {
 
 std::string jobText(const v1::Job& job) {
   std::ostringstream text;
-  text << job.id() << "  " << nameOf(job.state()) << "  " << job.model_name() << "  "
+  text << job.id() << "  " << nameOf(job.state()) << "  " << job.kind() << "  " << job.model_name() << "  "
        << static_cast<int>(100 * job.fraction()) << " %";
   if (job.has_model()) text << "  " << modelText(job.model());
   if (job.has_report()) text << "  " << reportText(job.report());
@@ -70,6 +70,14 @@ void show(ProgressBar& bar, const v1::Job& job) {
   text << (job.state() == v1::JOB_STATE_QUEUED ? "waiting for another job" : job.stage());
   if (job.residual() > 0) text << ", residual " << job.residual();
   bar.show(job.fraction(), text.str());
+}
+
+ExitCode printStarted(const v1::Job& job, const Session& session) {
+  if (session.json)
+    printJson(toJson(job));
+  else
+    std::cout << jobText(job) << "\n";
+  return ExitCode::kSuccess;
 }
 
 ExitCode printEnded(const v1::Job& job, const Session& session) {

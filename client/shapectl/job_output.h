@@ -17,6 +17,8 @@ nlohmann::json toJson(const v1::Job& job);
 std::string jobText(const v1::Job& job);
 /// Draws a job's progress.
 void show(ProgressBar& bar, const v1::Job& job);
+/// Prints a job that goes on without us.
+ExitCode printStarted(const v1::Job& job, const Session& session);
 /// Prints a job that has ended and returns how it ended.
 ExitCode printEnded(const v1::Job& job, const Session& session);
 

@@ -18,6 +18,13 @@ v1::Termination toProto(Termination termination) {
   return v1::TERMINATION_UNSPECIFIED;
 }
 
+Termination terminationFromProto(v1::Termination termination) {
+  for (const auto one : {Termination::kConverged, Termination::kIterationLimit, Termination::kStalled,
+                         Termination::kCancelled})
+    if (toProto(one) == termination) return one;
+  return Termination::kNumericalFailure;
+}
+
 void toProto(const Outcome& outcome, double seconds, v1::SolverReport& report) {
   report.set_termination(toProto(outcome.termination));
   report.set_iterations(outcome.iterations);

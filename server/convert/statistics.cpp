@@ -88,6 +88,12 @@ void toProto(const Statistics& statistics, v1::GetStatisticsResponse& response) 
     entry.set_cause(std::string(name(cause)));
     entry.set_count(count);
   }
+  for (const auto& [job, count] : statistics.ended_jobs) {
+    auto& entry = *response.add_ended_jobs();
+    entry.set_kind(job.kind);
+    entry.set_state(job.state);
+    entry.set_count(count);
+  }
   toProto(statistics.surroundings, response);
   toProto(statistics.process, *response.mutable_process());
   response.set_lost_log_lines(statistics.lost_log_lines);

@@ -8,7 +8,7 @@
 #include "server/daemon/scrape.h"
 #include "server/daemon/surroundings.h"
 #include "server/jobs/arena.h"
-#include "server/rpc/training.h"
+#include "server/rpc/job_kinds.h"
 #include "server/security/limits.h"
 #include "server/telemetry/call_log.h"
 
@@ -17,6 +17,8 @@ namespace {
 
 // Lists, uploads and deletions: short, often waiting for the disk.
 constexpr int kLightThreads = 2;
+// Clients that read a job's result slowly hold one each, and are in nobody's way but each other's.
+constexpr int kResultThreads = 4;
 constexpr std::chrono::hours kLongestHeavyCall(12);
 constexpr std::size_t kWaitingJobs = 64;
 constexpr AdmissionLimits kHeavyLimits{.queue_length = 8, .queue_bytes = 64 << 20, .open_streams = 1};
@@ -29,7 +31,8 @@ JobLimits jobLimits(const DaemonOptions& options) {
           .waiting = kWaitingJobs,
           .threads = options.threads,
           .crashes = options.job_crashes,
-          .retention = {options.keep_jobs, std::chrono::hours(static_cast<int>(24 * options.keep_jobs_days))}};
+          .retention = {options.keep_jobs, std::chrono::hours(static_cast<int>(24 * options.keep_jobs_days)),
+                        static_cast<std::uintmax_t>(options.keep_results)}};
 }
 
 }  // namespace
@@ -45,14 +48,19 @@ Daemon::Daemon(const DaemonOptions& options)
       pool_(options.threads, options.admission, alone),
       light_(kLightThreads, options.admission, alone),
       heavy_(1, kHeavyLimits, {}),
-      jobs_(job_registry_,
-            {{kTrainShellPga,
-              shellPgaTraining({datasets_, models_, metrics_, std::chrono::duration<double>(options.publish_patience),
-                                std::chrono::duration<double>(options.checkpoint_every)})}},
-            jobLimits(options), options.store / "jobs"),
+      results_(kResultThreads, options.admission, {}),
+      job_context_{datasets_,
+                   models_,
+                   metrics_,
+                   options_.limits,
+                   std::chrono::duration<double>(options.publish_patience),
+                   std::chrono::duration<double>(options.checkpoint_every)},
+      jobs_(job_registry_, jobKinds(job_context_), jobLimits(options), options.store / "jobs",
+            [this](const JobRecord& job) { metrics_.jobEnded(job.kind, nameOf(job.state)); }),
       runtime_{pool_,
                light_,
                heavy_,
+               results_,
                timer_,
                metrics_,
                std::chrono::duration<double>(options.longest_call),
@@ -62,9 +70,7 @@ Daemon::Daemon(const DaemonOptions& options)
                security_.access()},
       models_service_(runtime_, models_),
       datasets_service_(runtime_, options_.limits, datasets_),
-      jobs_service_(
-          runtime_, job_registry_, jobs_,
-          [this](const v1::TrainRequest& request) { return startTraining(datasets_, job_registry_, jobs_, request); }),
+      jobs_service_(runtime_, job_context_, job_registry_, jobs_),
       shapes_service_(runtime_, options_.limits, models_, datasets_),
       server_service_(runtime_, options_.limits, "shaped " SHAPED_VERSION),
       admin_service_(runtime_) {
@@ -72,6 +78,9 @@ Daemon::Daemon(const DaemonOptions& options)
        {v1::Models::service_full_name(), v1::Datasets::service_full_name(), v1::Jobs::service_full_name(),
         v1::Shapes::service_full_name(), v1::Server::service_full_name(), v1::Admin::service_full_name()})
     declareMethods(service, metrics_);
+  for (const auto& [kind, how] : jobKinds(job_context_))
+    for (const auto state : {JobState::kSucceeded, JobState::kFailed, JobState::kCancelled})
+      metrics_.declareJobs(kind, nameOf(state));
   if (!options.metrics.empty())
     scrape_ = std::make_unique<HttpListener>("--metrics", options.metrics, scrapeHandler(metrics_, ready_));
   listen(options.listen);
@@ -79,7 +88,8 @@ Daemon::Daemon(const DaemonOptions& options)
 }
 
 Surroundings Daemon::surroundings() {
-  return {{poolStatistics("solver", pool_), poolStatistics("light", light_), poolStatistics("heavy", heavy_)},
+  return {{poolStatistics("solver", pool_), poolStatistics("light", light_), poolStatistics("heavy", heavy_),
+           poolStatistics("results", results_)},
           modelMemory(models_),
           jobCounts(job_registry_)};
 }
@@ -127,6 +137,7 @@ void Daemon::useLimits() {
   setLogLevel(options_.log);
   pool_.setLimits(options_.admission);
   light_.setLimits(options_.admission);
+  results_.setLimits(options_.admission);
   runtime_.longest_call = std::chrono::duration<double>(options_.longest_call);
 }
 

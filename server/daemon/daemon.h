@@ -12,6 +12,7 @@
 #include "server/jobs/sqlite_job_registry.h"
 #include "server/rpc/admin_service.h"
 #include "server/rpc/datasets_service.h"
+#include "server/rpc/job_context.h"
 #include "server/rpc/jobs_service.h"
 #include "server/rpc/models_service.h"
 #include "server/rpc/server_service.h"
@@ -61,7 +62,8 @@ class Daemon {
   SqliteJobRegistry job_registry_;
   Metrics metrics_;
   DeadlineTimer timer_;
-  WorkerPool pool_, light_, heavy_;
+  WorkerPool pool_, light_, heavy_, results_;
+  const JobContext job_context_;
   JobRunner jobs_;
   Runtime runtime_;
   ModelsService models_service_;

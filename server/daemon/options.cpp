@@ -94,6 +94,7 @@ OptionSpec logFormatOption() {
 }
 
 constexpr std::int64_t kMostCount = 1 << 20;
+constexpr std::int64_t kMostMegabytes = std::int64_t{1} << 30;
 constexpr double kMostSeconds = 1e6;
 constexpr std::int64_t kMostVertices = 100'000'000;
 
@@ -107,7 +108,7 @@ std::vector<OptionSpec> servingOptions() {
           "folder of models, datasets and jobs, made when missing"),
       countOption(
           "threads", "N", When::kAtStart, 1024, [](auto& o) -> auto& { return o.threads; },
-          "solver threads, and threads of the training job; all processors where not given"),
+          "solver threads, and threads of the job that runs; all processors where not given"),
       numberOption(
           "longest-call", "S", When::kWhileRunning, 0.001, kMostSeconds,
           [](auto& o) -> auto& { return o.longest_call; },
@@ -135,6 +136,10 @@ std::vector<OptionSpec> jobOptions() {
       numberOption(
           "keep-jobs-days", "D", When::kAtStart, 0, 36500, [](auto& o) -> auto& { return o.keep_jobs_days; },
           "for at most so many days; 0: whatever their age"),
+      countOption(
+          "keep-results-megabytes", "N", When::kAtStart, kMostMegabytes,
+          [](auto& o) -> auto& { return o.keep_results; },
+          "results of jobs, all together; the oldest are forgotten with their jobs [MiB]", 1 << 20),
   };
 }
 
@@ -175,6 +180,10 @@ std::vector<OptionSpec> limitOptions() {
       countOption(
           "max-message-megabytes", "N", When::kAtStart, 1024, [](auto& o) -> auto& { return o.limits.message_bytes; },
           "largest message, either way [MiB]", 1 << 20),
+      countOption(
+          "max-job-megabytes", "N", When::kAtStart, kMostMegabytes,
+          [](auto& o) -> auto& { return o.limits.job_bytes; },
+          "most that is sent for one job, and largest result of one [MiB]", 1 << 20),
   };
 }
 

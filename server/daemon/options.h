@@ -15,13 +15,14 @@ namespace shaped::server {
 struct DaemonOptions {
   std::string listen = "127.0.0.1:50051";  ///< host:port, port 0 for any free one, or unix:PATH
   std::filesystem::path store;             ///< models, datasets and jobs; made when missing
-  int threads = 1;                         ///< of the solvers, and of the training job, 1 .. 1024
+  int threads = 1;                         ///< of the solvers, and of the job that runs, 1 .. 1024
   double longest_call = 600;               ///< cap on a call, and on a stream's time between messages [s], > 0
   double publish_patience = 300;           ///< how long a trained model waits for room on a full disk [s], >= 0
   double checkpoint_every = 10;            ///< time between two checkpoints of a running job [s], >= 0
   int job_crashes = 3;                     ///< crashes without a checkpoint in between that end a job, >= 1
   std::size_t keep_jobs = 1000;            ///< ended jobs that are remembered, >= 1
   double keep_jobs_days = 90;              ///< for at most so long [d], >= 0; 0: whatever their age
+  std::int64_t keep_results = std::int64_t{10} << 30;  ///< bytes of all results of batch jobs together, >= 1
   double drain = 0;                        ///< asked to stop: how long it still answers, NOT_SERVING [s], >= 0
   double grace = 5;                        ///< then: how long running calls may go on [s], >= 0
   double write_patience = 60;              ///< how long a stream waits for a client to take a message [s], > 0

@@ -4,22 +4,6 @@
 
 namespace shaped::server {
 
-std::string nameOf(JobState state) {
-  switch (state) {
-    case JobState::kQueued:
-      return "queued";
-    case JobState::kRunning:
-      return "running";
-    case JobState::kSucceeded:
-      return "succeeded";
-    case JobState::kFailed:
-      return "failed";
-    case JobState::kCancelled:
-      return "cancelled";
-  }
-  return "unknown";
-}
-
 PoolStatistics poolStatistics(const std::string& name, const WorkerPool& pool) {
   return {name, pool.load(), pool.limits()};
 }

@@ -7,9 +7,6 @@
 
 namespace shaped::server {
 
-/// "queued", "running", "succeeded", "failed", "cancelled".
-std::string nameOf(JobState state);
-
 PoolStatistics poolStatistics(const std::string& name, const WorkerPool& pool);
 std::vector<ModelMemory> modelMemory(ModelStore& models);
 /// Every state, also those that no job is in.

@@ -17,8 +17,13 @@ class AlreadyExists : public std::runtime_error {
   using std::runtime_error::runtime_error;
 };
 
-/// Full for now; the same request may succeed later.
+/// Too many jobs wait; the same request may succeed later.
 class Busy : public std::runtime_error {
+  using std::runtime_error::runtime_error;
+};
+
+/// Another program keeps a file of the store locked; the same request may succeed once that one has let go.
+class StoreLocked : public std::runtime_error {
   using std::runtime_error::runtime_error;
 };
 

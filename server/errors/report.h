@@ -18,6 +18,7 @@ enum class Reason {
   kWrongState,        ///< not possible as things stand, whatever the request says
   kServerBusy,        ///< refused at the door; google.rpc.RetryInfo says when to come back
   kTooManyJobs,       ///< too many jobs wait
+  kStoreLocked,       ///< another program keeps a file of the store locked
   kMemoryBudget,      ///< a model does not fit into the memory budget
   kDiskFull,          ///< no room in the store
   kOutOfMemory,       ///< no memory for this request

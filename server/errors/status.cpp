@@ -11,7 +11,7 @@
 namespace shaped::server {
 namespace {
 
-// Jobs take minutes: no use in asking sooner.
+// Jobs take minutes, and a lock has been waited for already: no use in asking sooner.
 constexpr std::chrono::seconds kBusyDelay(10);
 
 ErrorReport stoppedReport(StopReason reason) {
@@ -45,6 +45,8 @@ ErrorReport reportOf(const std::exception_ptr& error, StopReason stopped) {
     return {grpc::ALREADY_EXISTS, problem.what(), Reason::kAlreadyExists, {}, {}};
   } catch (const Busy& problem) {
     return {grpc::RESOURCE_EXHAUSTED, problem.what(), Reason::kTooManyJobs, {}, kBusyDelay};
+  } catch (const StoreLocked& problem) {
+    return {grpc::UNAVAILABLE, problem.what(), Reason::kStoreLocked, {}, kBusyDelay};
   } catch (const WrongState& problem) {
     return {grpc::FAILED_PRECONDITION, problem.what(), Reason::kWrongState, {}, {}};
   } catch (const OverBudget& problem) {
@@ -86,6 +88,8 @@ std::optional<RefusalCause> refusalCauseOf(const std::exception_ptr& error) {
     std::rethrow_exception(error);
   } catch (const Busy&) {
     return RefusalCause::kWaitingJobs;
+  } catch (const StoreLocked&) {
+    return RefusalCause::kStoreLock;
   } catch (const std::bad_alloc&) {
     return RefusalCause::kMemory;
   } catch (const FileError& problem) {

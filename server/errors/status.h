@@ -18,6 +18,7 @@ namespace shaped::server {
 ///   AlreadyExists -> ALREADY_EXISTS
 ///   WrongState -> FAILED_PRECONDITION
 ///   Busy, OverBudget, std::bad_alloc -> RESOURCE_EXHAUSTED
+///   StoreLocked -> UNAVAILABLE
 ///   Corrupted -> DATA_LOSS
 ///   Stopped -> see stoppedStatus
 ///   FileError, std::system_error -> RESOURCE_EXHAUSTED when the disk is full, else INTERNAL

@@ -13,6 +13,9 @@ enum class JobState { kQueued, kRunning, kSucceeded, kFailed, kCancelled };
 
 constexpr bool hasEnded(JobState state) { return state != JobState::kQueued && state != JobState::kRunning; }
 
+/// "queued", "running", "succeeded", "failed", "cancelled".
+std::string nameOf(JobState state);
+
 /// What a job leaves behind.
 struct JobResult {
   std::string model_name;
@@ -23,12 +26,17 @@ struct JobResult {
   std::string failure;              ///< why this is no success although nothing was thrown; empty: it is one
 };
 
+/// 128 random bits in hexadecimal.
+std::string newJobKey();
+
 /// All that is known of a job; a value, copied freely.
 struct JobRecord {
   using Time = std::chrono::system_clock::time_point;  // for people: nothing is decided by it but retention
 
   std::string id;       ///< from the registry: unique in its store, also after deletions and restarts
-  std::string key;      ///< from the registry: 32 hexadecimal digits, unique everywhere; marks what the job publishes
+  /// 32 hexadecimal digits, unique everywhere: marks what the job publishes, and is the name of its folder. From the
+  /// registry, unless its creator has chosen one by newJobKey().
+  std::string key;
   std::string kind;     ///< "train_shell_pga": names the work
   std::string request;  ///< what the work is to do, bytes of that kind's own
   std::string request_id;  ///< the client's, for creating a job once however often it asks; empty: none

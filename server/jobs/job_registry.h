@@ -18,10 +18,13 @@ struct JobQuery {
   std::size_t limit = 100;       ///< at most so many, >= 1
 };
 
-/// How many ended jobs are kept.
+/// Which ended jobs are kept.
 struct JobRetention {
   std::size_t most = 1000;          ///< the latest ones, >= 1
   std::chrono::hours age{24 * 90};  ///< by the wall clock; 0: whatever their age
+  /// Of the results that are kept, all together; the latest is kept whatever its size. Looked at by the runner, which
+  /// knows the files.
+  std::uintmax_t result_bytes = std::uintmax_t{10} << 30;
 };
 
 /// Where job records live: the one interface of job storage. A change is durable when the function returns, progress
@@ -31,8 +34,8 @@ struct JobRetention {
 /// holds while its worker lives, however long the work takes and whatever the clocks do; no lock is held meanwhile. How
 /// an implementation knows that a worker has died (a store's lock that is free again, a heartbeat missed) is its own.
 ///
-/// Every function throws FileError when the storage fails, and Busy when another program keeps it locked: then nothing
-/// was changed.
+/// Every function throws FileError when the storage fails, and StoreLocked when another program keeps it locked: then
+/// nothing was changed.
 class JobRegistry {
  public:
   /// Called after a change, on the thread that made it, without locks held; must be quick. Called no more, except where
@@ -41,8 +44,9 @@ class JobRegistry {
 
   virtual ~JobRegistry() = default;
 
-  /// Gives the record id, key and time and keeps it as queued. A job of the same request_id is returned instead if its
-  /// request is the same. Throws AlreadyExists when that is another, Busy when `most_waiting` jobs are queued.
+  /// Gives the record id, time and, where it has none, a key, and keeps it as queued. A job of the same request_id is
+  /// returned instead if its request is the same. Throws AlreadyExists when that is another, Busy when `most_waiting`
+  /// jobs are queued.
   virtual JobRecord create(JobRecord record, std::size_t most_waiting) = 0;
   /// Throws NotFound.
   virtual JobRecord get(const std::string& id) const = 0;
@@ -64,10 +68,10 @@ class JobRegistry {
   /// Claims the jobs of workers that died, and counts their crash.
   virtual std::vector<JobRecord> takeOver() = 0;
 
-  /// Forgets an ended job. Throws NotFound, WrongState when it has not ended.
-  virtual void remove(const std::string& id) = 0;
-  /// Forgets ended jobs, the oldest first, as the retention says.
-  virtual void forgetOld(const JobRetention& retention) = 0;
+  /// Forgets an ended job, and returns what was known of it. Throws NotFound, WrongState when it has not ended.
+  virtual JobRecord remove(const std::string& id) = 0;
+  /// Forgets ended jobs, the oldest first, as the retention says, and returns what was known of them.
+  virtual std::vector<JobRecord> forgetOld(const JobRetention& retention) = 0;
 };
 
 }  // namespace shaped::server

@@ -1,6 +1,7 @@
 #include "server/jobs/job_runner.h"
 
 #include <algorithm>
+#include <set>
 
 #include "server/errors/errors.h"
 #include "server/errors/status.h"
@@ -56,15 +57,20 @@ void markEnded(JobRecord& record, const JobResult& result) {
 std::string crashText(int crashes) {
   return "the daemon died " + std::to_string(crashes) +
          " times while it ran this job, without a checkpoint in between; it may need more memory than there is: see "
-         "the daemon's log, and train with fewer shapes or coarse_vertices";
+         "the daemon's log, and ask for less at a time (a training: fewer shapes or coarse_vertices)";
 }
 
 }  // namespace
 
-JobRunner::JobRunner(JobRegistry& registry, Kinds kinds, const JobLimits& limits, fs::path folder)
-    : registry_(registry), kinds_(std::move(kinds)), limits_(limits), folder_(std::move(folder)) {
+JobRunner::JobRunner(JobRegistry& registry, Kinds kinds, const JobLimits& limits, fs::path folder, Ended on_ended)
+    : registry_(registry),
+      kinds_(std::move(kinds)),
+      limits_(limits),
+      folder_(std::move(folder)),
+      on_ended_(std::move(on_ended)) {
+  fs::create_directories(folder_);
   for (const auto& left : registry_.takeOver()) settle(left);
-  registry_.forgetOld(limits_.retention);
+  forgetOld();
   removeStrayFolders();
   for (int i = 0; i < limits_.running; ++i) threads_.emplace_back([this] { serve(); });
 }
@@ -76,7 +82,7 @@ JobRunner::~JobRunner() {
 
 void JobRunner::settle(const JobRecord& left) {
   const auto kind = kinds_.find(left.kind);
-  const auto version = kind == kinds_.end() ? 0 : kind->second.published(left);
+  const auto version = kind == kinds_.end() || !kind->second.published ? 0 : kind->second.published(left);
   registry_.update(left.id, [&](JobRecord& record) {
     if (version != 0) {
       if (!record.result) record.result.emplace().model_name = record.model_name;
@@ -92,30 +98,88 @@ void JobRunner::settle(const JobRecord& left) {
   });
   logInfo("job " + left.id + " was left by a daemon that died: " +
           (version != 0 ? "its model is published" : "attempt " + std::to_string(left.attempts) + " has crashed"));
+  told(registry_.get(left.id));
+}
+
+void JobRunner::told(const JobRecord& job) const {
+  if (on_ended_ && hasEnded(job.state)) on_ended_(job);
 }
 
 void JobRunner::removeStrayFolders() const {
-  fs::create_directories(folder_);
-  const auto goesOn = [&](const std::string& id) {
-    try {
-      return !hasEnded(registry_.get(id).state);
-    } catch (const NotFound&) {
-      return false;
+  std::set<fs::path> known;
+  JobQuery page{.states = {}, .after = {}, .limit = 1000};
+  do {
+    const auto records = registry_.list(page);
+    for (const auto& record : records) {
+      tidy(record);
+      known.insert(folderOf(record));
     }
-  };
-  for (const auto& entry : fs::directory_iterator(folder_)) {
-    if (!goesOn(entry.path().filename().string())) {
-      fs::remove_all(entry.path());
-      continue;
-    }
-    // What a writer had not yet given its name.
-    for (const auto& file : fs::directory_iterator(entry.path()))
-      if (file.path().filename().string().find(".partial-") != std::string::npos) fs::remove(file.path());
+    page.after = records.size() == page.limit ? records.back().id : "";
+  } while (!page.after.empty());
+  for (const auto& entry : fs::directory_iterator(folder_))
+    if (known.count(entry.path()) == 0) fs::remove_all(entry.path());
+}
+
+/// Leaves of a job's folder what is still needed: of one that goes on all but what a writer had not yet given its name,
+/// of one that has succeeded the result.
+void JobRunner::tidy(const JobRecord& job) const {
+  const auto folder = folderOf(job);
+  if (!fs::exists(folder)) return;
+  const bool has_result = job.state == JobState::kSucceeded && fs::exists(folder / kResultFile);
+  if (hasEnded(job.state) && !has_result) {
+    fs::remove_all(folder);
+    return;
+  }
+  for (const auto& file : fs::directory_iterator(folder)) {
+    const auto name = file.path().filename().string();
+    if (has_result ? name != kResultFile : name.find(".partial-") != std::string::npos) fs::remove_all(file.path());
   }
 }
 
-JobRecord JobRunner::start(JobRecord wanted) {
+void JobRunner::forgetOld() const {
+  for (const auto& job : registry_.forgetOld(limits_.retention)) fs::remove_all(folderOf(job));
+  forgetLargeResults();
+}
+
+/// From the latest backwards, results are kept as long as they fit.
+void JobRunner::forgetLargeResults() const {
+  struct Kept {
+    JobRecord job;
+    std::uintmax_t bytes;
+  };
+  std::vector<Kept> kept;
+  JobQuery page{.states = {JobState::kSucceeded}, .after = {}, .limit = 1000};
+  do {
+    const auto records = registry_.list(page);
+    for (const auto& record : records) {
+      std::error_code none;
+      const auto bytes = fs::file_size(folderOf(record) / kResultFile, none);
+      if (!none) kept.push_back({record, bytes});
+    }
+    page.after = records.size() == page.limit ? records.back().id : "";
+  } while (!page.after.empty());
+  std::uintmax_t sum = 0;
+  for (auto item = kept.rbegin(); item != kept.rend(); ++item) {
+    sum += item->bytes;
+    if (item == kept.rbegin() || sum <= limits_.retention.result_bytes) continue;
+    logInfo("job " + item->job.id + " is forgotten: the results that are kept have become too large");
+    try {
+      forget(item->job.id);
+    } catch (const NotFound&) {  // a client has just done so
+    }
+  }
+}
+
+std::unique_ptr<JobInput> JobRunner::newInput() const { return std::make_unique<JobInput>(folder_, newJobKey()); }
+
+JobRecord JobRunner::start(JobRecord wanted, JobInput* input) {
+  if (input) {
+    input->sync();
+    wanted.key = input->key();
+  }
   auto record = registry_.create(std::move(wanted), limits_.waiting);
+  // From here on the job may run: its folder must not go any more.
+  if (input && record.key == input->key()) input->release();
   const std::scoped_lock lock(mutex_);
   ++wakes_;
   wake_.notify_one();
@@ -123,18 +187,37 @@ JobRecord JobRunner::start(JobRecord wanted) {
 }
 
 JobRecord JobRunner::cancel(const std::string& job) {
-  registry_.update(job, [](JobRecord& record) {
+  bool waited = false;
+  registry_.update(job, [&](JobRecord& record) {
     record.cancel_requested = true;
-    if (record.state == JobState::kQueued) markStopped(record);
+    waited = record.state == JobState::kQueued;
+    if (waited) markStopped(record);
   });
   {
     const std::scoped_lock lock(mutex_);
     if (const auto found = stops_.find(job); found != stops_.end()) found->second.request_stop();
   }
   const auto record = registry_.get(job);
+  if (!waited) return record;
+  told(record);
   std::error_code ignored;  // at the next start it goes anyway
-  if (record.state == JobState::kCancelled) fs::remove_all(folderOf(job), ignored);
+  fs::remove_all(folderOf(record), ignored);
   return record;
+}
+
+/// The record first: a folder without one is removed at the next start, a record without its result would lie.
+void JobRunner::forget(const std::string& job) const {
+  std::error_code ignored;
+  fs::remove_all(folderOf(registry_.remove(job)), ignored);
+}
+
+fs::path JobRunner::resultOf(const std::string& job) const {
+  const auto record = registry_.get(job);
+  if (record.state != JobState::kSucceeded)
+    throw WrongState("job " + job + " is " + nameOf(record.state) + ": only one that has succeeded has a result");
+  auto file = folderOf(record) / kResultFile;
+  if (!fs::exists(file)) throw WrongState("job " + job + ", of kind " + record.kind + ", has published what it made");
+  return file;
 }
 
 void JobRunner::leave() {
@@ -189,7 +272,7 @@ std::stop_token JobRunner::enter(const std::string& id) {
 JobRun JobRunner::runOf(const JobRecord& job, std::stop_token stop) {
   const auto& id = job.id;
   return {job,
-          folderOf(id),
+          folderOf(job),
           [this, id](const Progress& progress) { registry_.report(id, progress); },
           std::move(stop),
           [this, id](const std::string& stage) {
@@ -203,19 +286,23 @@ JobRun JobRunner::runOf(const JobRecord& job, std::stop_token stop) {
           }};
 }
 
-/// Records how a run ended, however long that takes on a full disk; false when the runner left before: then the next
-/// start finds out what became of the job.
-bool JobRunner::end(const std::string& id, const std::function<void(JobRecord&)>& change) {
+/// Records how a run ended, however long that takes on a full disk, and returns the record; nothing when the runner left
+/// before: then the next start finds out what became of the job.
+std::optional<JobRecord> JobRunner::end(const std::string& id, const std::function<void(JobRecord&)>& change) {
+  std::optional<JobRecord> ended;
   for (bool told = false;;) {
     try {
-      registry_.update(id, change);
-      return true;
+      registry_.update(id, [&](JobRecord& record) {
+        change(record);
+        ended = record;
+      });
+      return ended;
     } catch (const std::exception& problem) {
       if (!told) logError("the end of job " + id + " cannot be recorded, trying again: " + problem.what());
       told = true;
     }
     std::unique_lock lock(mutex_);
-    if (wake_.wait_for(lock, kRetry, [&] { return leaving_; })) return false;
+    if (wake_.wait_for(lock, kRetry, [&] { return leaving_; })) return std::nullopt;
   }
 }
 
@@ -234,15 +321,16 @@ void JobRunner::run(const JobRecord& job) {
     const auto status = statusOf(std::current_exception(), StopReason::kNone);
     how_it_ended = [status](JobRecord& record) { markFailed(record, status.error_message(), status.error_code()); };
   }
-  const bool recorded = end(job.id, how_it_ended);
+  const auto ended = end(job.id, how_it_ended);
   {
     const std::scoped_lock lock(mutex_);
     stops_.erase(job.id);
   }
   try {
-    if (!recorded || !hasEnded(registry_.get(job.id).state)) return;
-    fs::remove_all(folderOf(job.id));
-    registry_.forgetOld(limits_.retention);
+    if (!ended || !hasEnded(ended->state)) return;
+    told(*ended);
+    tidy(*ended);
+    forgetOld();
   } catch (const std::exception& problem) {
     logError("after job " + job.id + ": " + problem.what());
   }

@@ -60,7 +60,7 @@ void Database::fail(const std::string& problem) const {
   switch (primary(sqlite3_errcode(handle_))) {
     case SQLITE_BUSY:
     case SQLITE_LOCKED:
-      throw Busy(file_ + ": is locked by another program; end that one and try again");
+      throw StoreLocked(file_ + ": is locked by another program; end that one and try again");
     case SQLITE_CORRUPT:
     case SQLITE_NOTADB:
       throw Corrupted(file_ + ": is damaged or no database (" + sqlite3_errmsg(handle_) +

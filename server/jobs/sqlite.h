@@ -14,7 +14,7 @@ namespace shaped::server {
 /// An open SQLite database. One thread at a time.
 ///
 /// What fails throws FileError that names the file, what failed and the system's reason (a full disk, a read-only file
-/// system), Corrupted when the file is damaged or no database, Busy when another program locks it for ten seconds.
+/// system), Corrupted when the file is damaged or no database, StoreLocked when another program locks it for ten seconds.
 class Database {
  public:
   /// Opens or creates the file; ":memory:" for one that ends with the object.

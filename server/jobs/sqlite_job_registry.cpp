@@ -1,22 +1,12 @@
 #include "server/jobs/sqlite_job_registry.h"
 
 #include <algorithm>
-#include <random>
 
 #include "core/io/text_scanner.h"
 #include "server/errors/errors.h"
 
 namespace shaped::server {
 namespace {
-
-/// 128 random bits in hexadecimal.
-std::string randomKey() {
-  constexpr char digits[] = "0123456789abcdef";
-  std::random_device source;
-  std::string key;
-  for (int i = 0; i < 32; ++i) key += digits[source() & 15U];
-  return key;
-}
 
 /// 0, which no job has, for what is no id.
 std::uint64_t numberOf(const std::string& id) {
@@ -36,7 +26,7 @@ constexpr std::size_t kAll = 1'000'000'000;
 }  // namespace
 
 SqliteJobRegistry::SqliteJobRegistry(const std::filesystem::path& file, Duration save_every)
-    : save_every_(save_every), owner_(randomKey()), table_(file) {
+    : save_every_(save_every), owner_(newJobKey()), table_(file) {
   for (auto& row : table_.list({{JobState::kQueued, JobState::kRunning}, {}, kAll})) {
     const auto number = numberOf(row.record.id);
     live_[number] = {std::move(row), Steady::now(), {}};
@@ -68,7 +58,7 @@ JobRecord SqliteJobRegistry::create(JobRecord record, std::size_t most_waiting) 
       live_.begin(), live_.end(), [](const auto& item) { return item.second.row.record.state == JobState::kQueued; });
   if (static_cast<std::size_t>(waiting) >= most_waiting)
     throw Busy("too many jobs are waiting; watch one end, or cancel one, and try again");
-  record.key = randomKey();
+  if (record.key.empty()) record.key = newJobKey();
   record.created = std::chrono::floor<std::chrono::microseconds>(std::chrono::system_clock::now());
   record.state = JobState::kQueued;
   Row row{std::move(record), {}};
@@ -204,19 +194,26 @@ std::vector<JobRecord> SqliteJobRegistry::takeOver() {
   return taken;
 }
 
-void SqliteJobRegistry::remove(const std::string& id) {
+JobRecord SqliteJobRegistry::remove(const std::string& id) {
   const std::scoped_lock lock(mutex_);
   if (findLive(id) != live_.end())
     throw WrongState("job " + id + " has not ended; cancel it, and delete it once it has");
-  if (!table_.get(id)) throwNotFound(id);
+  const auto row = table_.get(id);
+  if (!row) throwNotFound(id);
   table_.erase(id);
+  return row->record;
 }
 
-void SqliteJobRegistry::forgetOld(const JobRetention& retention) {
+std::vector<JobRecord> SqliteJobRegistry::forgetOld(const JobRetention& retention) {
   const auto limit =
       retention.age.count() > 0 ? std::chrono::system_clock::now() - retention.age : JobRecord::Time::min();
   const std::scoped_lock lock(mutex_);
-  for (const auto& id : table_.old(retention.most, limit)) table_.erase(id);
+  std::vector<JobRecord> forgotten;
+  for (const auto& id : table_.old(retention.most, limit)) {
+    if (auto row = table_.get(id)) forgotten.push_back(std::move(row->record));
+    table_.erase(id);
+  }
+  return forgotten;
 }
 
 }  // namespace shaped::server

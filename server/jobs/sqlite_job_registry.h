@@ -28,8 +28,8 @@ class SqliteJobRegistry final : public JobRegistry {
   void report(const std::string& id, const Progress& progress) override;
   std::optional<JobRecord> claim() override;
   std::vector<JobRecord> takeOver() override;
-  void remove(const std::string& id) override;
-  void forgetOld(const JobRetention& retention) override;
+  JobRecord remove(const std::string& id) override;
+  std::vector<JobRecord> forgetOld(const JobRetention& retention) override;
 
  private:
   using Steady = std::chrono::steady_clock;

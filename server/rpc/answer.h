@@ -17,16 +17,23 @@ ServedModelPtr pinModel(ModelStore& store, const Request& request, Call& call) {
   return model;
 }
 
-/// Fills what every answer carries. Throws Stopped when the solver was cancelled: then there is no answer.
+/// Fills what every answer carries. seconds: of the work, by the wall clock.
+template <class Response>
+void fillAnswer(const ServedModel& model, const Outcome& outcome, double seconds, double smallest_area_ratio,
+                Response& response) {
+  response.mutable_model()->set_name(model.name);
+  response.mutable_model()->set_version(model.version);
+  toProto(outcome, seconds, *response.mutable_report());
+  response.set_smallest_area_ratio(smallest_area_ratio);
+}
+
+/// The same for a call, and counts. Throws Stopped when the solver was cancelled: then there is no answer.
 template <class Response>
 void setAnswer(const ServedModel& model, const Outcome& outcome, double smallest_area_ratio, Call& call,
                Response& response) {
   if (outcome.termination == Termination::kCancelled) throw Stopped();
   call.solved(outcome);
-  response.mutable_model()->set_name(model.name);
-  response.mutable_model()->set_version(model.version);
-  toProto(outcome, call.workSeconds(), *response.mutable_report());
-  response.set_smallest_area_ratio(smallest_area_ratio);
+  fillAnswer(model, outcome, call.workSeconds(), smallest_area_ratio, response);
 }
 
 }  // namespace shaped::server

@@ -3,6 +3,13 @@
 #include <algorithm>
 
 #include "server/convert/job.h"
+#include "server/errors/errors.h"
+#include "server/jobs/record_file.h"
+#include "server/rpc/evaluate.h"
+#include "server/rpc/marker_job.h"
+#include "server/rpc/project_job.h"
+#include "server/rpc/server_stream_call.h"
+#include "server/rpc/training.h"
 #include "server/rpc/unary_call.h"
 #include "server/rpc/wait_call.h"
 #include "server/rpc/watch_call.h"
@@ -26,13 +33,60 @@ void list(const JobRegistry& registry, const v1::ListJobsRequest& request, v1::L
   for (const auto& record : records) toProto(record, *response.add_jobs());
 }
 
+using WriteAnswer = std::function<void(const v1::GetJobResultResponse&)>;
+
+void sendResult(const JobRunner& runner, const v1::GetJobResultRequest& request, const WriteAnswer& write) {
+  RecordReader reader(runner.resultOf(request.id()));
+  std::string record;
+  v1::GetJobResultResponse answer;
+  for (std::uint64_t index = 0; reader.next(record); ++index) {
+    if (index < request.skip()) continue;
+    if (!answer.ParseFromString(record))
+      throw Corrupted("the result of job " + request.id() + " cannot be read at answer " + std::to_string(index));
+    write(answer);
+  }
+}
+
 }  // namespace
 
 grpc::ServerUnaryReactor* JobsService::Train(grpc::CallbackServerContext* context, const v1::TrainRequest* request,
                                              v1::TrainResponse* response) {
   return startUnary<v1::TrainRequest, v1::TrainResponse>(
       runtime_, runtime_.light, "Jobs.Train", context, request, response,
-      [this](const auto& wanted, auto& answer, Call&) { toProto(start_training_(wanted), *answer.mutable_job()); });
+      [this](const auto& wanted, auto& answer, Call&) { toProto(startTraining(desk_, wanted), *answer.mutable_job()); });
+}
+
+grpc::ServerUnaryReactor* JobsService::Evaluate(grpc::CallbackServerContext* context,
+                                                const v1::EvaluateJobRequest* request,
+                                                v1::EvaluateJobResponse* response) {
+  return startUnary<v1::EvaluateJobRequest, v1::EvaluateJobResponse>(
+      runtime_, runtime_.light, "Jobs.Evaluate", context, request, response,
+      [this](const auto& wanted, auto& answer, Call& call) {
+        toProto(startEvaluation(desk_, wanted, call), *answer.mutable_job());
+      });
+}
+
+grpc::ServerUnaryReactor* JobsService::Project(grpc::CallbackServerContext* context,
+                                               const v1::ProjectJobRequest* request,
+                                               v1::ProjectJobResponse* response) {
+  return startUnary<v1::ProjectJobRequest, v1::ProjectJobResponse>(
+      runtime_, runtime_.light, "Jobs.Project", context, request, response,
+      [this](const auto& wanted, auto& answer, Call& call) {
+        toProto(startProjection(desk_, wanted, call), *answer.mutable_job());
+      });
+}
+
+grpc::ServerReadReactor<v1::FitMarkersJobRequest>* JobsService::FitMarkers(grpc::CallbackServerContext* context,
+                                                                           v1::FitMarkersJobResponse* response) {
+  return startClientStream<v1::FitMarkersJobRequest, v1::FitMarkersJobResponse>(
+      runtime_, runtime_.light, "Jobs.FitMarkers", context, response, makeTakeUpload(desk_));
+}
+
+grpc::ServerWriteReactor<v1::GetJobResultResponse>* JobsService::GetResult(grpc::CallbackServerContext* context,
+                                                                           const v1::GetJobResultRequest* request) {
+  return startServerStream<v1::GetJobResultRequest, v1::GetJobResultResponse>(
+      runtime_, runtime_.results, "Jobs.GetResult", context, request,
+      [this](const auto& wanted, const auto& write, Call&) { sendResult(runner_, wanted, write); });
 }
 
 grpc::ServerUnaryReactor* JobsService::Get(grpc::CallbackServerContext* context, const v1::GetJobRequest* request,
@@ -74,7 +128,7 @@ grpc::ServerUnaryReactor* JobsService::Delete(grpc::CallbackServerContext* conte
                                               v1::DeleteJobResponse* response) {
   return startUnary<v1::DeleteJobRequest, v1::DeleteJobResponse>(
       runtime_, runtime_.light, "Jobs.Delete", context, request, response,
-      [this](const auto& wanted, auto&, Call&) { registry_.remove(wanted.id()); });
+      [this](const auto& wanted, auto&, Call&) { runner_.forget(wanted.id()); });
 }
 
 }  // namespace shaped::server

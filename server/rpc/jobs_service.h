@@ -1,25 +1,30 @@
 #pragma once
 
-#include <functional>
 #include <stop_token>
 
 #include "server/jobs/job_registry.h"
 #include "server/jobs/job_runner.h"
 #include "server/rpc/call.h"
+#include "server/rpc/job_context.h"
 #include "shaped/v1/jobs.grpc.pb.h"
 
 namespace shaped::server {
 
 class JobsService final : public v1::Jobs::CallbackService {
  public:
-  /// Checks the request and starts its job; throws as statusOf says.
-  using StartTraining = std::function<JobRecord(const v1::TrainRequest&)>;
-
-  JobsService(Runtime& runtime, JobRegistry& registry, JobRunner& runner, StartTraining start_training)
-      : runtime_(runtime), registry_(registry), runner_(runner), start_training_(std::move(start_training)) {}
+  JobsService(Runtime& runtime, const JobContext& context, JobRegistry& registry, JobRunner& runner)
+      : runtime_(runtime), registry_(registry), runner_(runner), desk_{context, registry, runner} {}
 
   grpc::ServerUnaryReactor* Train(grpc::CallbackServerContext* context, const v1::TrainRequest* request,
                                   v1::TrainResponse* response) override;
+  grpc::ServerUnaryReactor* Evaluate(grpc::CallbackServerContext* context, const v1::EvaluateJobRequest* request,
+                                     v1::EvaluateJobResponse* response) override;
+  grpc::ServerUnaryReactor* Project(grpc::CallbackServerContext* context, const v1::ProjectJobRequest* request,
+                                    v1::ProjectJobResponse* response) override;
+  grpc::ServerReadReactor<v1::FitMarkersJobRequest>* FitMarkers(grpc::CallbackServerContext* context,
+                                                                v1::FitMarkersJobResponse* response) override;
+  grpc::ServerWriteReactor<v1::GetJobResultResponse>* GetResult(grpc::CallbackServerContext* context,
+                                                                const v1::GetJobResultRequest* request) override;
   grpc::ServerUnaryReactor* Get(grpc::CallbackServerContext* context, const v1::GetJobRequest* request,
                                 v1::GetJobResponse* response) override;
   grpc::ServerUnaryReactor* List(grpc::CallbackServerContext* context, const v1::ListJobsRequest* request,
@@ -40,7 +45,7 @@ class JobsService final : public v1::Jobs::CallbackService {
   Runtime& runtime_;
   JobRegistry& registry_;
   JobRunner& runner_;
-  StartTraining start_training_;
+  const JobDesk desk_;
   std::stop_source stop_;
 };
 

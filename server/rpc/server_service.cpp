@@ -17,6 +17,7 @@ void toProto(const Limits& limits, v1::Limits& message) {
   message.set_calibration_frames(number(limits.calibration_frames));
   message.set_path_steps(number(limits.path_steps));
   message.set_times(number(limits.times));
+  message.set_job_bytes(number(limits.job_bytes));
 }
 
 }  // namespace

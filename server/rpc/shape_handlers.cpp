@@ -20,6 +20,16 @@ Handle handleFromProto(const v1::Handle& message, const Topology& topology, std:
 
 }  // namespace
 
+void fill(const ServedModel& served, const ShellPgaProjection& projection, bool with_shape,
+          v1::ProjectResponse& response) {
+  if (with_shape) toProto(projection.shape, served.shell_pga->topology(), *response.mutable_shape());
+  toProto(projection.coefficients, *response.mutable_coefficients());
+  response.mutable_tangent_coordinates()->Add(projection.tangent_coordinates.begin(),
+                                              projection.tangent_coordinates.end());
+  response.set_residual_energy(projection.residual_energy);
+  toProto(projection.score, *response.mutable_score());
+}
+
 void project(ModelStore& store, const v1::ProjectRequest& request, v1::ProjectResponse& response, Call& call) {
   const auto served = pinModel(store, request, call);
   const auto& model = *served->shell_pga;
@@ -28,14 +38,8 @@ void project(ModelStore& store, const v1::ProjectRequest& request, v1::ProjectRe
                                   .fine = request.fine(),
                                   .stop = call.stopToken()};
   const auto solved = project(model, shape, options);
-  const auto& projection = solved.solution;
-  setAnswer(*served, solved, projection.smallest_area_ratio, call, response);
-  toProto(projection.shape, model.topology(), *response.mutable_shape());
-  toProto(projection.coefficients, *response.mutable_coefficients());
-  response.mutable_tangent_coordinates()->Add(projection.tangent_coordinates.begin(),
-                                              projection.tangent_coordinates.end());
-  response.set_residual_energy(projection.residual_energy);
-  toProto(projection.score, *response.mutable_score());
+  setAnswer(*served, solved, solved.solution.smallest_area_ratio, call, response);
+  fill(*served, solved.solution, true, response);
 }
 
 void synthesize(ModelStore& store, const Limits& limits, const v1::SynthesizeRequest& request,

@@ -1,16 +1,11 @@
 #include "server/rpc/training.h"
 
-#include <condition_variable>
-#include <mutex>
-
-#include "core/io/file_error.h"
 #include "core/mesh/quality.h"
 #include "core/model/shell_pga_training.h"
 #include "core/numerics/error.h"
 #include "server/convert/model.h"
 #include "server/datasets/name.h"
 #include "server/errors/errors.h"
-#include "server/errors/status.h"
 #include "server/telemetry/call_log.h"
 
 namespace shaped::server {
@@ -40,33 +35,6 @@ ShellPgaTrainingOptions optionsFrom(const v1::ShellPgaTraining& message, const D
   if (message.tolerance() != 0) options.tolerance = message.tolerance();
   if (const auto violation = options.firstViolation(shapes)) throw InvalidInput("shell_pga", *violation);
   return options;
-}
-
-v1::TrainRequest requestOf(const JobRecord& job) {
-  v1::TrainRequest request;
-  if (!request.ParseFromString(job.request)) throw Corrupted("the request of job " + job.id + " cannot be read");
-  return request;
-}
-
-/// False when the token fired first.
-bool sleepUnlessStopped(Clock::duration time, const std::stop_token& stop) {
-  std::mutex mutex;
-  std::condition_variable_any wake;
-  std::unique_lock lock(mutex);
-  return !wake.wait_for(lock, stop, time, [] { return false; }) && !stop.stop_requested();
-}
-
-/// A full disk must not cost hours of training: tries again until there is room, the patience ends or the job is
-/// stopped.
-void patiently(const TrainingContext& context, const JobRun& run, const std::function<void()>& write) {
-  const auto until = Clock::now() + std::chrono::duration_cast<Clock::duration>(context.publish_patience);
-  while (true) try {
-      return write();
-    } catch (const FileError& error) {
-      if (!saysDiskFull(error.what()) || Clock::now() >= until) throw;
-      run.progress({std::string("waiting for room on the disk: ") + error.what(), 1, 0});
-      if (!sleepUnlessStopped(std::chrono::seconds(2), run.stop)) throw Stopped();
-    }
 }
 
 ShellPgaModelPtr withSeconds(const ShellPgaModel& model, double seconds) {
@@ -127,9 +95,9 @@ std::string unconvergedText(const Outcome& outcome) {
          "), so no model was published; ask for it with publish_unconverged, or allow more iterations";
 }
 
-JobResult train(const TrainingContext& context, const JobRun& run) {
+JobResult train(const JobContext& context, const JobRun& run) {
   const auto begin = Clock::now();
-  const auto request = requestOf(run.job);
+  const auto request = requestOf<v1::TrainRequest>(run.job);
   const auto options = optionsFrom(request.shell_pga(), context.datasets.get(request.dataset()));
   auto dataset = context.datasets.load(request.dataset());
   const ShellPgaTrainingSet set{dataset.topology, std::move(dataset.shapes), std::move(dataset.template_shape)};
@@ -155,26 +123,21 @@ JobResult train(const TrainingContext& context, const JobRun& run) {
 
 }  // namespace
 
-JobKind shellPgaTraining(const TrainingContext& context) {
-  return {[context](const JobRun& run) { return train(context, run); },
-          [context](const JobRecord& job) { return context.models.publishedBy(job.model_name, job.key); }};
+JobKind shellPgaTraining(const JobContext& context) {
+  return {[&context](const JobRun& run) { return train(context, run); },
+          [&context](const JobRecord& job) { return context.models.publishedBy(job.model_name, job.key); }};
 }
 
-JobRecord startTraining(const DatasetStore& datasets, const JobRegistry& registry, JobRunner& runner,
-                        const v1::TrainRequest& request) {
-  if (!request.request_id().empty()) requireName(request.request_id(), "request_id");
+JobRecord startTraining(const JobDesk& desk, const v1::TrainRequest& request) {
+  const auto known = earlierJob(desk, request.request_id());
   requireName(request.model_name(), "model_name");
   if (!request.has_shell_pga()) throw InvalidInput("method", "is missing; want shell_pga");
   // A repeated request has its answer even if its dataset has been deleted since.
-  if (request.request_id().empty() || !registry.find(request.request_id()))
-    optionsFrom(request.shell_pga(), datasets.get(request.dataset()));
-  JobRecord wanted;
-  wanted.kind = kTrainShellPga;
-  wanted.request = request.SerializeAsString();
-  wanted.request_id = request.request_id();
+  if (!known) optionsFrom(request.shell_pga(), desk.context.datasets.get(request.dataset()));
+  auto wanted = newJob(kTrainShellPga, request.SerializeAsString(), request.request_id());
   wanted.model_name = request.model_name();
   wanted.dataset = request.dataset();
-  return runner.start(std::move(wanted));
+  return desk.runner.start(std::move(wanted));
 }
 
 }  // namespace shaped::server

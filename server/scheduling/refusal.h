@@ -11,13 +11,15 @@ enum class RefusalCause {
   kQueueBytes,   ///< their messages together are too large
   kOpenStreams,  ///< too many streams are open
   kWaitingJobs,  ///< too many jobs wait
+  kStoreLock,    ///< another program keeps a file of the store locked
   kMemory,       ///< no memory for this request
   kDisk,         ///< the store's disk is full
 };
 
 inline constexpr std::array kRefusalCauses{RefusalCause::kQueueLength, RefusalCause::kQueueBytes,
                                            RefusalCause::kOpenStreams, RefusalCause::kWaitingJobs,
-                                           RefusalCause::kMemory,      RefusalCause::kDisk};
+                                           RefusalCause::kStoreLock,   RefusalCause::kMemory,
+                                           RefusalCause::kDisk};
 
 constexpr std::string_view name(RefusalCause cause) {
   switch (cause) {
@@ -29,6 +31,8 @@ constexpr std::string_view name(RefusalCause cause) {
       return "open_streams";
     case RefusalCause::kWaitingJobs:
       return "waiting_jobs";
+    case RefusalCause::kStoreLock:
+      return "store_lock";
     case RefusalCause::kMemory:
       return "memory";
     case RefusalCause::kDisk:

@@ -123,7 +123,10 @@ void addStores(const Statistics& statistics, Families& families) {
     models.add({{"model", model.name}, {"version", std::to_string(model.version)}}, number(model.bytes));
   auto jobs = gauge("shaped_jobs", "Job records, by state");
   for (const auto& [state, count] : statistics.surroundings.jobs) jobs.add({{"state", state}}, number(count));
-  for (auto* family : {&refusals, &models, &jobs}) families.push_back(family->take());
+  auto ended = counter("shaped_jobs_ended_total", "Jobs that have ended, by kind and how");
+  for (const auto& [job, count] : statistics.ended_jobs)
+    ended.add({{"kind", job.kind}, {"state", job.state}}, number(count));
+  for (auto* family : {&refusals, &models, &jobs, &ended}) families.push_back(family->take());
 }
 
 void addProcess(const Statistics& statistics, Families& families) {

@@ -78,6 +78,16 @@ MethodMetrics& Metrics::method(const std::string& name) {
   return *method;
 }
 
+void Metrics::jobEnded(const std::string& kind, const std::string& state) {
+  const std::scoped_lock lock(mutex_);
+  ++ended_jobs_[{kind, state}];
+}
+
+void Metrics::declareJobs(const std::string& kind, const std::string& state) {
+  const std::scoped_lock lock(mutex_);
+  ended_jobs_.emplace(EndedJobs{kind, state}, 0);
+}
+
 Statistics Metrics::snapshot() const {
   Statistics statistics;
   statistics.version = SHAPED_VERSION;
@@ -86,6 +96,7 @@ Statistics Metrics::snapshot() const {
   {
     const std::shared_lock lock(mutex_);
     for (const auto& [name, method] : methods_) statistics.methods.push_back(method->snapshot());
+    statistics.ended_jobs = ended_jobs_;
   }
   for (const auto cause : kRefusalCauses) statistics.refusals[cause] = refusals_[static_cast<std::size_t>(cause)];
   statistics.surroundings = surroundings_();

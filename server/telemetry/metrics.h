@@ -64,6 +64,11 @@ class Metrics {
   MethodMetrics& method(const std::string& name);
   void refused(RefusalCause cause) { ++refusals_[static_cast<std::size_t>(cause)]; }
 
+  /// A job has ended. kind and state: from the code.
+  void jobEnded(const std::string& kind, const std::string& state);
+  /// Makes the count of such ends known, so that it begins at 0.
+  void declareJobs(const std::string& kind, const std::string& state);
+
   Statistics snapshot() const;
 
  private:
@@ -72,6 +77,7 @@ class Metrics {
   const std::chrono::steady_clock::time_point begin_;
   mutable std::shared_mutex mutex_;  // of the map, not of what it points to
   std::map<std::string, std::unique_ptr<MethodMetrics>> methods_;
+  std::map<EndedJobs, std::uint64_t> ended_jobs_;
   std::array<std::atomic<std::uint64_t>, kRefusalCauses.size()> refusals_{};
 };
 

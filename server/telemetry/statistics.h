@@ -2,6 +2,7 @@
 
 #include <array>
 #include <chrono>
+#include <compare>
 #include <cstdint>
 #include <map>
 #include <string>
@@ -35,7 +36,7 @@ struct MethodStatistics {
 };
 
 struct PoolStatistics {
-  std::string name;  ///< "solver", "light", "heavy"
+  std::string name;  ///< "solver", "light", "heavy", "results"
   Load load;
   AdmissionLimits limits;
 };
@@ -53,12 +54,19 @@ struct Surroundings {
   std::map<std::string, std::uint64_t> jobs;  ///< records kept, by state
 };
 
+/// How jobs of one kind ended: "succeeded", "failed", "cancelled".
+struct EndedJobs {
+  std::string kind, state;
+  auto operator<=>(const EndedJobs&) const = default;
+};
+
 struct Statistics {
   std::string version;  ///< of the program
   std::chrono::system_clock::time_point started;
   double uptime = 0;                      ///< [s]
   std::vector<MethodStatistics> methods;  ///< by name
   std::map<RefusalCause, std::uint64_t> refusals;
+  std::map<EndedJobs, std::uint64_t> ended_jobs;  ///< since the start
   Surroundings surroundings;
   ProcessStatistics process;
   std::uint64_t lost_log_lines = 0;

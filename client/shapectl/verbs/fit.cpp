@@ -1,16 +1,17 @@
 #include <algorithm>
-#include <cmath>
 #include <optional>
 
+#include "client/jobs.h"
 #include "client/marker_fit.h"
 #include "client/mesh.h"
 #include "client/models.h"
+#include "client/shapectl/fit_report.h"
 #include "client/shapectl/frame_range.h"
+#include "client/shapectl/job_run.h"
 #include "client/shapectl/numbers.h"
 #include "client/shapectl/output.h"
 #include "client/shapectl/progress_bar.h"
 #include "client/shapectl/verbs/verbs.h"
-#include "core/io/file.h"
 #include "core/io/frames.h"
 #include "core/io/marker_file.h"
 #include "core/io/marker_set_file.h"
@@ -24,77 +25,11 @@ std::vector<std::string> labelsOf(const MarkerSet& set) {
   return labels;
 }
 
-/// Gathers the frames' answers into the report.
-class Report {
- public:
-  explicit Report(std::vector<std::string> labels)
-      : labels_(std::move(labels)), sums_(labels_.size()), counts_(labels_.size()) {}
-
-  void add(const v1::FitMarkersResponse& response) {
-    model_ = response.model();
-    nlohmann::json frame{
-        {"frame", response.frame()}, {"rms", response.rms()}, {"smallest_area_ratio", response.smallest_area_ratio()}};
-    addReport(frame, response.report());
-    auto& residuals = frame["residuals"] = nlohmann::json::object();
-    for (std::size_t i = 0; i < labels_.size(); ++i) addResidual(residuals, i, response.residuals(static_cast<int>(i)));
-    frames_.push_back(std::move(frame));
-    const auto& solver = response.report();
-    if (solver.termination() != v1::TERMINATION_CONVERGED && worst_.termination() == v1::TERMINATION_CONVERGED)
-      worst_.set_termination(solver.termination());
-    worst_.set_iterations(worst_.iterations() + solver.iterations());
-    worst_.set_residual(std::max(worst_.residual(), solver.residual()));
-    worst_.set_seconds(worst_.seconds() + solver.seconds());
-    smallest_area_ratio_ = std::min(smallest_area_ratio_, response.smallest_area_ratio());
-  }
-
-  /// Of all frames: iterations and seconds add up, the first that did not converge names the termination.
-  const v1::SolverReport& solver() const { return worst_; }
-
-  /// Everything; without the frames for the terminal.
-  nlohmann::json document(bool with_frames) const {
-    nlohmann::json document{{"frame_count", frames_.size()}, {"smallest_area_ratio", smallest_area_ratio_}};
-    addModel(document, model_);
-    addReport(document, worst_);
-    auto& markers = document["marker_rms"] = nlohmann::json::object();
-    for (std::size_t i = 0; i < labels_.size(); ++i)
-      markers[labels_[i]] = counts_[i] > 0 ? std::sqrt(sums_[i] / counts_[i]) : std::nan("");
-    document["rms"] = rms();
-    if (with_frames) document["frames"] = frames_;
-    return document;
-  }
-
-  double rms() const {
-    double sum = 0, count = 0;
-    for (std::size_t i = 0; i < labels_.size(); ++i) sum += sums_[i], count += counts_[i];
-    return count > 0 ? std::sqrt(sum / count) : std::nan("");
-  }
-
- private:
-  void addResidual(nlohmann::json& residuals, std::size_t marker, double residual) {
-    residuals[labels_[marker]] = residual;  // NaN, a marker not seen, becomes null
-    if (!std::isfinite(residual)) return;
-    sums_[marker] += residual * residual;
-    counts_[marker] += 1;
-  }
-
-  static v1::SolverReport converged() {
-    v1::SolverReport report;
-    report.set_termination(v1::TERMINATION_CONVERGED);
-    return report;
-  }
-
-  const std::vector<std::string> labels_;
-  std::vector<double> sums_, counts_;  // squared residuals per marker
-  v1::ModelVersion model_;
-  v1::SolverReport worst_ = converged();
-  double smallest_area_ratio_ = 1;
-  nlohmann::json frames_ = nlohmann::json::array();
-};
-
 struct Fit {
   std::string name, trial_file, set_file, range, out, report_file;
   std::int64_t modes = 0, calibration = 3;
   double prior_weight = 0, scale = 0;
+  JobFlags flags;
 
   void declare(Arguments& arguments) {
     arguments.positional("NAME", name, "The model, NAME or NAME@VERSION");
@@ -109,6 +44,7 @@ struct Fit {
     arguments.option("--scale", scale, "S", "Size of the subject over that of the model (estimated)");
     arguments.option("--calibration", calibration, "N",
                      "Frames, spread over the trial, that tell the size, 1 to 16 (3)");
+    flags.declare(arguments);
   }
 
   ExitCode run(const Session& session) const {
@@ -125,18 +61,18 @@ struct Fit {
                                           wanted.row(i) = all.row(rows[static_cast<std::size_t>(i)]);
                                         return wanted;
                                       }};
-    Report report(labelsOf(set));
-    stream(channel, model, set, frames, session, report);
-    if (!report_file.empty())
-      writeFile(report_file,
-                report.document(true).dump(2, ' ', false, nlohmann::json::error_handler_t::replace) + "\n");
-    print(report, session);
+    const auto setup = setupOf(model, set, frames);
+    if (flags.any()) return runAsJob(session, setup, frames, set);
+    FitReport report(labelsOf(set));
+    stream(channel, setup, frames, session, report);
+    if (!report_file.empty()) report.write(report_file);
+    report.print(session);
     return exitCodeOf(report.solver());
   }
 
  private:
-  void stream(const std::shared_ptr<grpc::Channel>& channel, const client::ModelMesh& model, const MarkerSet& set,
-              const client::MarkerFrames& frames, const Session& session, Report& report) const {
+  v1::FitMarkersRequest::Setup setupOf(const client::ModelMesh& model, const MarkerSet& set,
+                                       const client::MarkerFrames& frames) const {
     v1::FitMarkersRequest::Setup setup;
     *setup.mutable_model() = client::pinned(model.description);
     *setup.mutable_marker_set() = client::pack(set);
@@ -144,7 +80,26 @@ struct Fit {
     setup.set_prior_weight(prior_weight);
     setup.set_scale(scale);
     if (scale == 0) addCalibration(frames, setup);
-    setup.set_without_shapes(out.empty());
+    // Whoever fetches a detached job's result says only then whether he wants the shapes.
+    setup.set_without_shapes(out.empty() && !flags.detach);
+    return setup;
+  }
+
+  ExitCode runAsJob(const Session& session, const v1::FitMarkersRequest::Setup& setup,
+                    const client::MarkerFrames& frames, const MarkerSet& set) const {
+    JobResultOutput output({out, report_file, {}}, labelsOf(set));
+    return runBatch(session, flags, output, [&](v1::Jobs::Stub& jobs, ProgressBar& bar) {
+      v1::FitMarkersJobRequest::Header header;
+      *header.mutable_setup() = setup;
+      const auto count = static_cast<double>(frames.numbers.size());
+      return client::startMarkerFit(jobs, header, frames, session.callOptions(), [&](std::int64_t sent) {
+        bar.show(static_cast<double>(sent) / count, "uploading");
+      });
+    });
+  }
+
+  void stream(const std::shared_ptr<grpc::Channel>& channel, const v1::FitMarkersRequest::Setup& setup,
+              const client::MarkerFrames& frames, const Session& session, FitReport& report) const {
     std::optional<FrameWriter> writer;
     if (!out.empty()) writer.emplace(out);
     ProgressBar bar;
@@ -173,13 +128,6 @@ struct Fit {
       const auto best = std::max_element(begin, end, [&](auto a, auto b) { return seen(a) < seen(b); });
       if (seen(*best) > 3) *setup.add_calibration() = client::packFrame(frames, *best);
     }
-  }
-
-  static void print(const Report& report, const Session& session) {
-    const auto document = report.document(false);
-    if (session.json) return printJson(document);
-    std::cout << document["frame_count"] << " frames: " << reportText(report.solver()) << "\nRMS "
-              << 1000 * report.rms() << " mm, smallest area ratio " << document["smallest_area_ratio"] << "\n";
   }
 };
 

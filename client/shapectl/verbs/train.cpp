@@ -1,6 +1,7 @@
 #include "client/dataset_upload.h"
 #include "client/jobs.h"
 #include "client/shapectl/job_output.h"
+#include "client/shapectl/job_run.h"
 #include "client/shapectl/numbers.h"
 #include "client/shapectl/verbs/verbs.h"
 
@@ -12,7 +13,7 @@ struct Train {
   std::vector<std::string> meshes;
   std::int64_t modes = 0, path_steps = 0, coarse_vertices = 0;
   double bending = 0;
-  bool publish_unconverged = false, directed = false;
+  bool publish_unconverged = false, directed = false, detach = false;
 
   void declare(Arguments& arguments) {
     arguments.positional("METHOD", method, "shell-pga");
@@ -26,6 +27,7 @@ struct Train {
     arguments.option("--coarse-vertices", coarse_vertices, "N", "Solve on a mesh of at most so many vertices (1000)");
     arguments.flag("--directed", directed, "Let distances count one direction of the energy, as in the paper (both)");
     arguments.flag("--publish-unconverged", publish_unconverged, "Publish the model even if it did not converge");
+    arguments.flag("--detach", detach, "Leave the job to itself: `shapectl watch JOB` follows it");
   }
 
   ExitCode run(const Session& session) const {
@@ -33,13 +35,14 @@ struct Train {
     const auto shapes = source();
     const auto channel = session.channel();
     const auto jobs = v1::Jobs::NewStub(channel);
-    v1::Job ended;
+    v1::Job job;
     {
       ProgressBar bar;
       const auto dataset = upload(channel, shapes, session, bar);
-      ended = follow(*jobs, start(*jobs, dataset, session), session, bar);
+      job = start(*jobs, dataset, session);
+      if (!detach) job = follow(*jobs, job, session, bar);
     }
-    return printEnded(ended, session);
+    return detach ? printStarted(job, session) : printEnded(job, session);
   }
 
  private:
@@ -73,27 +76,6 @@ struct Train {
     v1::TrainResponse response;
     client::require(jobs.Train(call.context(), request, &response));
     return response.job();
-  }
-
-  /// Nobody waits for the job any more once the watch ends by Ctrl-C or --timeout: it is cancelled. When the daemon
-  /// goes away, the job stays: it goes on with the next start.
-  static v1::Job follow(v1::Jobs::Stub& jobs, const v1::Job& job, const Session& session, ProgressBar& bar) {
-    const auto draw = [&bar](const v1::Job& state) { show(bar, state); };
-    try {
-      return client::watchJob(jobs, job.id(), session.callOptions(), draw);
-    } catch (const client::RpcError& error) {
-      if (!session.stop.stop_requested() && error.code() != grpc::DEADLINE_EXCEEDED) throw daemonGone(job, error);
-      const client::CallOptions farewell{.timeout = std::chrono::seconds(10), .stop = {}};
-      client::cancelJob(jobs, job.id(), farewell);
-      const auto ended = client::watchJob(jobs, job.id(), farewell, draw);
-      if (!session.stop.stop_requested()) throw;
-      return ended;
-    }
-  }
-
-  static client::RpcError daemonGone(const v1::Job& job, const client::RpcError& error) {
-    return client::RpcError({error.code(), std::string(error.what()) + "; job " + job.id() +
-                                               " is kept: `shapectl watch " + job.id() + "` follows it again"});
   }
 };
 

@@ -7,7 +7,7 @@ std::vector<Verb> allVerbs() {
       trainVerb(),                                                     //
       modelsVerb(),  describeVerb(),   deleteVerb(),                   //
       loadVerb(),    unloadVerb(),     labelVerb(),       waitVerb(),  //
-      jobsVerb(),    watchVerb(),      cancelVerb(), deleteJobVerb(),  //
+      jobsVerb(),    watchVerb(),      resultVerb(),      cancelVerb(), deleteJobVerb(),  //
       projectVerb(), synthesizeVerb(), interpolateVerb(), editVerb(),  //
       fitVerb(),     scoreVerb(),      evaluateVerb(),                 //
       sampleVerb(),  renderVerb(),     tokenVerb(),                    //

@@ -17,6 +17,7 @@ Verb deleteVerb();
 Verb deleteJobVerb();
 Verb jobsVerb();
 Verb watchVerb();
+Verb resultVerb();
 Verb cancelVerb();
 Verb projectVerb();
 Verb synthesizeVerb();

@@ -50,6 +50,7 @@ TEST_CASE("every kind of failure has its status") {
   CHECK(statusFor(NotFound("x")).error_code() == grpc::NOT_FOUND);
   CHECK(statusFor(AlreadyExists("x")).error_code() == grpc::ALREADY_EXISTS);
   CHECK(statusFor(Busy("x")).error_code() == grpc::RESOURCE_EXHAUSTED);
+  CHECK(statusFor(StoreLocked("x")).error_code() == grpc::UNAVAILABLE);
   CHECK(statusFor(Corrupted("x")).error_code() == grpc::DATA_LOSS);
   CHECK(statusFor(std::bad_alloc()).error_code() == grpc::RESOURCE_EXHAUSTED);
   CHECK(statusFor(std::runtime_error("x")).error_code() == grpc::INTERNAL);
@@ -67,6 +68,7 @@ TEST_CASE("a full disk is a resource, another disk failure is internal") {
 TEST_CASE("what was turned away for want of something says of what") {
   const auto cause = [](const auto& error) { return refusalCauseOf(std::make_exception_ptr(error)); };
   CHECK(cause(Busy("x")) == RefusalCause::kWaitingJobs);
+  CHECK(cause(StoreLocked("x")) == RefusalCause::kStoreLock);
   CHECK(cause(std::bad_alloc()) == RefusalCause::kMemory);
   CHECK(cause(FileError("m", std::generic_category().message(ENOSPC))) == RefusalCause::kDisk);
   CHECK(cause(std::system_error(EDQUOT, std::generic_category())) == RefusalCause::kDisk);

@@ -3,6 +3,7 @@
 #include <catch2/catch.hpp>
 #include <condition_variable>
 #include <future>
+#include <set>
 
 #include "core/io/file.h"
 #include "core/numerics/error.h"
@@ -171,8 +172,8 @@ TEST_CASE("a runner that leaves queues its jobs again, and the next one does the
     waiting = runner.start(wanted("n")).id;
     waitForStart(registry, running);
   }
-  CHECK(std::filesystem::exists(at.jobs / running / "checkpoint"));
   SqliteJobRegistry registry(at.file);
+  CHECK(std::filesystem::exists(at.jobs / registry.get(running).key / "checkpoint"));
   CHECK(registry.get(running).state == JobState::kQueued);
   CHECK(registry.get(running).crashes == 0);
   JobRunner runner(registry, kindsOf([](const JobRun&) { return published(); }), {}, at.jobs);
@@ -223,16 +224,162 @@ TEST_CASE("a job that was being cancelled when its process died is cancelled") {
 TEST_CASE("folders of no job that goes on, and half-written files, are removed at the start") {
   const Setting at;
   const auto id = crashedJob(at.file);
-  for (const auto& name : {id, std::string("99"), std::string("rubbish")})
-    std::filesystem::create_directories(at.jobs / name);
-  writeFile(at.jobs / id / "checkpoint", "x");
-  writeFile(at.jobs / id / "checkpoint.partial-1-2", "x");
   SqliteJobRegistry registry(at.file);
+  const auto key = registry.get(id).key;
+  for (const auto& name : {key, std::string("99"), std::string("rubbish")})
+    std::filesystem::create_directories(at.jobs / name);
+  writeFile(at.jobs / key / "checkpoint", "x");
+  writeFile(at.jobs / key / "checkpoint.partial-1-2", "x");
   JobRunner runner(registry, kindsOf(untilStopped), {}, at.jobs);
-  CHECK(std::filesystem::exists(at.jobs / id / "checkpoint"));
-  CHECK_FALSE(std::filesystem::exists(at.jobs / id / "checkpoint.partial-1-2"));
+  CHECK(std::filesystem::exists(at.jobs / key / "checkpoint"));
+  CHECK_FALSE(std::filesystem::exists(at.jobs / key / "checkpoint.partial-1-2"));
   CHECK_FALSE(std::filesystem::exists(at.jobs / "99"));
   CHECK_FALSE(std::filesystem::exists(at.jobs / "rubbish"));
+}
+
+namespace {
+
+/// Leaves a result of so many bytes, and what else a kind keeps.
+Work leaving(std::size_t bytes) {
+  return [bytes](const JobRun& run) {
+    writeFile(run.folder / "checkpoint", "x");
+    writeFile(run.folder / kResultFile, std::string(bytes, 'r'));
+    return JobResult{{}, 0, {Termination::kConverged, 3, 1e-9}, 0.1, 0.5, {}};
+  };
+}
+
+std::set<std::string> namesIn(const std::filesystem::path& folder) {
+  std::set<std::string> names;
+  for (const auto& entry : std::filesystem::directory_iterator(folder)) names.insert(entry.path().filename());
+  return names;
+}
+
+/// Until the runner has tidied up behind the job.
+void waitForNames(const std::filesystem::path& folder, const std::set<std::string>& names) {
+  const auto until = std::chrono::steady_clock::now() + 20s;
+  while (namesIn(folder) != names && std::chrono::steady_clock::now() < until) std::this_thread::sleep_for(1ms);
+  CHECK(namesIn(folder) == names);
+}
+
+}  // namespace
+
+TEST_CASE("a result is kept with its job, over a restart too, and goes with it") {
+  const Setting at;
+  std::string id, key;
+  {
+    SqliteJobRegistry registry(at.file);
+    JobRunner runner(registry, kindsOf(leaving(9)), {}, at.jobs);
+    id = runner.start(wanted()).id;
+    key = waitForEnd(registry, id).key;
+    waitForNames(at.jobs / key, {kResultFile});
+    CHECK(runner.resultOf(id) == at.jobs / key / kResultFile);
+  }
+  SqliteJobRegistry registry(at.file);
+  JobRunner runner(registry, kindsOf(untilStopped), {}, at.jobs);
+  CHECK(readFile(runner.resultOf(id)) == "rrrrrrrrr");
+  const auto running = waitForStart(registry, runner.start(wanted()).id);
+  CHECK_THROWS_WITH(runner.resultOf(running.id), Catch::Contains("is running"));
+  CHECK_THROWS_AS(runner.forget(running.id), WrongState);
+  runner.forget(id);
+  CHECK_FALSE(std::filesystem::exists(at.jobs / key));
+  CHECK_THROWS_AS(runner.resultOf(id), NotFound);
+}
+
+TEST_CASE("a job that failed or published keeps no result") {
+  const Setting at;
+  SqliteJobRegistry registry(at.file);
+  JobRunner runner(registry, kindsOf([](const JobRun& run) -> JobResult {
+                     if (run.job.model_name == "m") return published();
+                     writeFile(run.folder / kResultFile, "x");
+                     throw InvalidInput("frames[3]", "is bad");
+                   }),
+                   {}, at.jobs);
+  const auto training = waitForEnd(registry, runner.start(wanted()).id);
+  CHECK_THROWS_WITH(runner.resultOf(training.id), Catch::Contains("published"));
+  const auto failed = waitForEnd(registry, runner.start(wanted("n")).id);
+  CHECK_THROWS_AS(runner.resultOf(failed.id), WrongState);
+  waitForNames(at.jobs, {});
+}
+
+TEST_CASE("results that are too large together are forgotten from the oldest on, but for the latest") {
+  const Setting at;
+  SqliteJobRegistry registry(at.file);
+  JobLimits limits;
+  limits.retention.result_bytes = 250;
+  std::vector<std::string> ids;
+  {
+    JobRunner runner(registry, kindsOf(leaving(100)), limits, at.jobs);
+    for (int i = 0; i < 3; ++i) ids.push_back(runner.start(wanted()).id);
+    for (const auto& id : ids)
+      if (id != ids[0]) waitForEnd(registry, id);
+  }
+  CHECK_THROWS_AS(registry.get(ids[0]), NotFound);
+  CHECK(registry.get(ids[1]).state == JobState::kSucceeded);
+  CHECK(namesIn(at.jobs).size() == 2);
+  limits.retention.result_bytes = 1;
+  JobRunner runner(registry, kindsOf(leaving(100)), limits, at.jobs);
+  CHECK_THROWS_AS(registry.get(ids[1]), NotFound);
+  CHECK_NOTHROW(runner.resultOf(ids[2]));
+}
+
+TEST_CASE("what a client sent is the job's, once, however often it starts it") {
+  const Setting at;
+  SqliteJobRegistry registry(at.file);
+  JobRunner runner(registry, kindsOf([](const JobRun& run) {
+                     CHECK(std::filesystem::exists(run.folder / kInputFile));
+                     return untilStopped(run);
+                   }),
+                   {}, at.jobs);
+  auto job = wanted();
+  job.request_id = "r";
+  std::string key;
+  for (int i = 0; i < 2; ++i) {
+    const auto input = runner.newInput();
+    input->append("frame");
+    const auto started = runner.start(job, input.get());
+    if (i == 0) key = started.key;
+    CHECK(started.key == key);
+    CHECK((input->key() == key) == (i == 0));
+  }
+  CHECK(namesIn(at.jobs) == std::set<std::string>{key});
+  const auto id = registry.find("r")->id;
+  runner.cancel(id);
+  waitForEnd(registry, id);
+  waitForNames(at.jobs, {});
+}
+
+TEST_CASE("whoever asked hears of every end, once") {
+  const Setting at;
+  const auto crashed = crashedJob(at.file, 2);
+  SqliteJobRegistry registry(at.file);
+  std::mutex mutex;
+  std::vector<std::pair<std::string, JobState>> ends;
+  JobRunner runner(registry, kindsOf([](const JobRun& run) {
+                     return run.job.model_name == "m" ? published() : untilStopped(run);
+                   }),
+                   {}, at.jobs, [&](const JobRecord& job) {
+                     const std::scoped_lock lock(mutex);
+                     ends.emplace_back(job.id, job.state);
+                   });
+  const auto done = runner.start(wanted()).id;
+  waitForEnd(registry, done);
+  const auto running = waitForStart(registry, runner.start(wanted("n")).id).id;
+  const auto waiting = runner.start(wanted("n")).id;
+  runner.cancel(waiting);
+  runner.cancel(waiting);
+  runner.cancel(running);
+  waitForEnd(registry, running);
+  const std::vector<std::pair<std::string, JobState>> expected{{crashed, JobState::kFailed},
+                                                               {done, JobState::kSucceeded},
+                                                               {waiting, JobState::kCancelled},
+                                                               {running, JobState::kCancelled}};
+  const auto until = std::chrono::steady_clock::now() + 20s;
+  const auto heard = [&] {
+    const std::scoped_lock lock(mutex);
+    return ends;
+  };
+  while (heard().size() < expected.size() && std::chrono::steady_clock::now() < until) std::this_thread::sleep_for(1ms);
+  CHECK(heard() == expected);
 }
 
 TEST_CASE("a job of a kind that this daemon does not know has failed") {

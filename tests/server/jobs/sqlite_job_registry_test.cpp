@@ -165,7 +165,9 @@ TEST_CASE("the oldest ended jobs are forgotten, by count and by age") {
   std::vector<std::string> ended;
   for (int i = 0; i < 4; ++i) ended.push_back(registry.create(wanted(), kMany).id);
   for (const auto& id : ended) registry.update(id, succeed);
-  registry.forgetOld({3, std::chrono::hours(0)});
+  const auto forgotten = registry.forgetOld({3, std::chrono::hours(0)});
+  REQUIRE(forgotten.size() == 1);
+  CHECK(forgotten[0].id == ended[0]);
   CHECK_THROWS_AS(registry.get(ended[0]), NotFound);
   CHECK(registry.list({}).size() == 4);
   CHECK_FALSE(registry.update(ended[2], [](JobRecord& record) { record.stage = "late"; }));
@@ -196,6 +198,26 @@ TEST_CASE("a damaged database is refused with its name and what to do, one of a 
   CHECK_THROWS_AS(SqliteJobRegistry(folder.file("torn.sqlite", bytes)), Corrupted);
   Database(file).run("PRAGMA user_version = 2");
   CHECK_THROWS_WITH(SqliteJobRegistry(file), Contains("schema version 2"));
+}
+
+TEST_CASE("a database that another program keeps locked says so, and nothing is changed") {
+  const test::TemporaryFolder folder;
+  SqliteJobRegistry registry(folder / "jobs.sqlite");
+  {
+    Database other(folder / "jobs.sqlite");
+    const Transaction lock(other);
+    CHECK_THROWS_AS(registry.create(wanted(), kMany), StoreLocked);  // after ten seconds
+  }
+  CHECK(registry.list({}).empty());
+  CHECK_NOTHROW(registry.create(wanted(), kMany));
+}
+
+TEST_CASE("a record keeps the key that it was given") {
+  SqliteJobRegistry registry(":memory:");
+  auto record = wanted();
+  record.key = newJobKey();
+  CHECK(registry.create(record, kMany).key == record.key);
+  CHECK(newJobKey() != record.key);
 }
 
 TEST_CASE("a folder that is not there says so") {

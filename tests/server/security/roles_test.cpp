@@ -44,6 +44,8 @@ TEST_CASE("the roles of methods") {
   CHECK(requirementOf("/shaped.v1.Datasets/Upload").role == Role::kTrain);
   CHECK(requirementOf("/shaped.v1.Jobs/Watch").role == Role::kRead);
   CHECK(requirementOf("/shaped.v1.Jobs/Cancel").role == Role::kTrain);
+  CHECK(requirementOf("/shaped.v1.Jobs/FitMarkers").role == Role::kInfer);
+  CHECK(requirementOf("/shaped.v1.Jobs/GetResult").role == Role::kInfer);
   CHECK(requirementOf("/shaped.v1.Shapes/FitMarkers").role == Role::kInfer);
   CHECK(requirementOf("/grpc.health.v1.Health/Check").who == Who::kEverybody);
   CHECK(requirementOf("/grpc.reflection.v1alpha.ServerReflection/ServerReflectionInfo").who == Who::kClients);

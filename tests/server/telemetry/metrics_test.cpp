@@ -83,7 +83,12 @@ TEST_CASE("the exposition says what was counted, in Prometheus' format") {
   method.ended({"OK", 0.3, 0.0002, 0.25});
   method.solved({Termination::kIterationLimit, 40, 0});
   metrics.refused(RefusalCause::kQueueLength);
+  metrics.declareJobs("evaluate", "failed");
+  metrics.jobEnded("evaluate", "succeeded");
+  metrics.jobEnded("evaluate", "succeeded");
   const auto text = exposition(metrics.snapshot());
+  CHECK_THAT(text, Catch::Contains("shaped_jobs_ended_total{kind=\"evaluate\",state=\"failed\"} 0"));
+  CHECK_THAT(text, Catch::Contains("shaped_jobs_ended_total{kind=\"evaluate\",state=\"succeeded\"} 2"));
   for (const std::string line : {
            "# TYPE shaped_requests_total counter",
            "shaped_requests_total{method=\"Shapes.Project\",code=\"OK\"} 1",

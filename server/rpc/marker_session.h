@@ -1,0 +1,42 @@
+#pragma once
+
+#include <stop_token>
+#include <vector>
+
+#include "core/model/marker_fitter.h"
+#include "server/convert/limits.h"
+#include "server/models/model_store.h"
+#include "shaped/v1/shapes.pb.h"
+
+namespace shaped::server {
+
+/// One take of markers as its setup describes it: a fitter that goes from frame to frame.
+class MarkerSession {
+ public:
+  /// Throws InvalidInput naming setup's field.
+  MarkerSession(ServedModelPtr served, const v1::FitMarkersRequest::Setup& setup, const Limits& limits,
+                std::stop_token stop);
+
+  const ServedModel& served() const { return *served_; }
+  Eigen::Index markerCount() const { return marker_count_; }
+  /// L x 3. Throws InvalidInput naming the frame's field.
+  MarkerPositions positionsIn(const v1::MarkerFrame& frame) const;
+
+  /// Fits the next frame; the first answer reports the calibration's iterations too. Fills what is particular to the
+  /// frame into the response. Throws Stopped when the token fired during the calibration; InvalidInput naming the
+  /// frame's field, or setup.calibration.
+  Solved<FittedFrame> fit(const v1::MarkerFrame& frame, v1::FitMarkersResponse& response);
+
+  MarkerTrackerState state() const { return fitter_.state(); }
+  /// Goes on behind frames that a session of the same setup has fitted.
+  void resume(MarkerTrackerState state);
+
+ private:
+  const ServedModelPtr served_;
+  const Eigen::Index marker_count_;
+  const bool with_shapes_;
+  MarkerFitter fitter_;
+  std::vector<MarkerPositions> calibration_;  ///< frames that are still to tell the subject's size
+};
+
+}  // namespace shaped::server
