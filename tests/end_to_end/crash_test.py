@@ -4,19 +4,39 @@
 
 kills more often than the 10 times of a usual run. SHAPED_SEED repeats a run."""
 
+import itertools
+import json
 import os
 import pathlib
 import random
+import shutil
 import signal
 import subprocess
 import tempfile
 import time
 import unittest
 
-from support import SUCCESS, Daemon, DaemonCase, tube, write_mesh
+import numpy
+
+from batch_jobs_test import without_seconds, write_take
+from support import NOT_CONVERGED, SUCCESS, Daemon, DaemonCase, tube, write_mesh
 
 KILLS = int(os.environ.get("SHAPED_KILLS", "10"))
 SEED = int(os.environ.get("SHAPED_SEED", random.randrange(10 ** 6)))
+
+
+LATE_STAGES = ("gram", "reflected", "backward")
+
+
+def tensor(path, name):
+    """One tensor of doubles out of a safetensors file; None when the file is not there."""
+    try:
+        content = path.read_bytes()
+    except FileNotFoundError:
+        return None
+    length = int.from_bytes(content[:8], "little")
+    begin, end = json.loads(content[8:8 + length])[name]["data_offsets"]
+    return numpy.frombuffer(content[8 + length + begin:8 + length + end])
 
 
 class Killed(unittest.TestCase):
@@ -64,9 +84,10 @@ class Killed(unittest.TestCase):
             time.sleep(0.05)
         self.fail(f"jobs go on: {jobs}")
 
-    def assertTidy(self, models, datasets):
+    def assertTidy(self, models, datasets, results=0):
         """The store holds what is listed, whole, and nothing else."""
-        self.assertEqual(list((self.store / "jobs").iterdir()), [])
+        self.assertEqual([path.name for path in (self.store / "jobs").rglob("*") if path.is_file()], ["result"] * results)
+        self.assertEqual(len(list((self.store / "jobs").iterdir())), results)
         self.assertEqual({path.name for path in self.store.iterdir()} - {"jobs.sqlite-wal", "jobs.sqlite-shm"},
                          {".lock", "datasets", "jobs", "jobs.sqlite", "models"})
         files = {str(path.relative_to(self.store / "models")) for path in (self.store / "models").rglob("*")
@@ -106,18 +127,103 @@ class Killed(unittest.TestCase):
         self.assertTidy(self.listed(), self.datasets())
         print(f"{kills} kills, {resumed} seen resumed, {len(self.jobs())} jobs, seed {SEED}")
 
+    def killed_in_stage(self, name, stage):
+        """Kills the daemon once a checkpoint holds an item of the stage; what the next one resumed from, or nothing when the
+        training was faster."""
+        self.begin(name)
+        until = time.monotonic() + 60
+        while time.monotonic() < until:
+            path = next((self.store / "jobs").glob("*/checkpoint.safetensors"), None)
+            states = path and tensor(path, f"{stage}.states")
+            if states is not None and states.any():
+                break
+            if path is None and self.jobs(name)[-1]["state"] not in ("queued", "running"):
+                return ""
+        self.kill()
+        return self.finish()[-1].get("resumed_from", "")
+
+    def test_killed_in_every_stage_after_the_mean(self):
+        seen = []
+        for stage, words in zip(LATE_STAGES, ("Gram matrix", "reflections", "principal variations")):
+            # A stage is over in a fraction of a second: the next try meets it when one has come too late.
+            for attempt in range(10):
+                seen.append(self.killed_in_stage(f"{stage}{attempt}", stage))
+                if any(word in seen[-1] for word in ("Gram", "reflections", "variations")):
+                    break
+            self.assertRegex(seen[-1], "Gram matrix|reflections|principal variations", words)
+        jobs = self.jobs()
+        self.assertEqual({job["state"] for job in jobs}, {"succeeded"})
+        self.kill()
+        self.assertTidy({(job["model_name"], 1) for job in jobs}, self.datasets())
+        print("resumed from", seen)
+
+    def test_killed_in_batch_jobs(self):
+        self.assertEqual(self.shapectl("train", "shell-pga", "tubes", *self.meshes, "--coarse-vertices", 100, "--modes", 3).code, SUCCESS)
+        dataset, = self.datasets()
+        fit = write_take(self.folder, 100, lambda angle: tube(angle, 0.3, 40, 14), (1, 141, 283, 425, 556))
+        kinds = {"evaluate": ["evaluate", "tubes", "--samples", 2], "fit_markers": fit,
+                 "project": ["project", "tubes", "--dataset", dataset, "--fine"]}
+        whole = {kind: self.result(self.shapectl(*words, "--detach").json["id"]) for kind, words in kinds.items()}
+        kills, resumed, jobs = 0, 0, len(kinds)
+        for kind, words in itertools.cycle(kinds.items()):
+            if kills >= KILLS:
+                break
+            job = self.shapectl(*words, "--detach").json["id"]
+            jobs += 1
+            for _ in range(4):
+                time.sleep(self.random.uniform(0, 0.6))
+                self.kill()
+                kills += 1
+                resumed += "resumed_from" in self.job(job)
+            self.assertEqual(self.result(job), whole[kind], f"seed {SEED}: {kind}")
+        self.kill()
+        self.assertTidy({("tubes", 1)}, {dataset}, jobs)
+        print(f"{kills} kills in batch jobs, {resumed} seen resumed, {jobs} jobs, seed {SEED}")
+
+    def job(self, job):
+        return next(one for one in self.jobs() if one["id"] == job)
+
+    def result(self, job):
+        """The answers of a job, once it has ended."""
+        self.finish()
+        self.assertEqual(self.job(job)["state"], "succeeded", self.job(job))
+        report = self.folder / "report.json"
+        report.unlink(missing_ok=True)
+        fetched = self.shapectl("result", job, "--report", report)
+        self.assertIn(fetched.code, (SUCCESS, NOT_CONVERGED), fetched.err)
+        return without_seconds(json.loads(report.read_text()) if report.exists() else fetched.json)
+
+    def timed(self, *words):
+        begin = time.monotonic()
+        self.assertEqual(self.shapectl(*words).code, SUCCESS)
+        return time.monotonic() - begin
+
     def test_killed_while_uploading_and_deleting(self):
-        for i in range(max(3, KILLS // 3)):
-            words = self.random.choice((["train", "shell-pga", "m", *self.meshes, "--coarse-vertices", "60",
-                                         "--path-steps", "2"], ["delete", "m"]))
-            client = subprocess.Popen(DaemonCase.command(*words), stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
-            time.sleep(self.random.uniform(0, 0.5))
+        train = ["train", "shell-pga", "m", *self.meshes, "--coarse-vertices", "60", "--path-steps", "2", "--detach"]
+        upload_time = self.timed(*train)
+        self.finish()
+        whole = self.folder / "whole"
+        shutil.copytree(self.store / "models/m/1", whole)
+        delete_time = self.timed("delete", "m@1")
+        deleted = 0
+        for i in range(KILLS):
+            version = 1000 * (i + 1)  # between them is room for what trainings publish
+            delete = self.random.random() < 0.5
+            if delete:  # one more version, as another process would bring it in
+                shutil.copytree(whole, self.store / f"models/m/.copy{version}")
+                (self.store / f"models/m/.copy{version}").rename(self.store / f"models/m/{version}")
+            client = subprocess.Popen(DaemonCase.command(*(["delete", f"m@{version}"] if delete else train)),
+                                      stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
+            time.sleep(self.random.uniform(0, 1.6 * (delete_time if delete else upload_time)))
             self.kill()
             client.kill()
             client.wait()
-        self.finish()
+            deleted += delete and ("m", version) not in self.listed()
+        jobs = self.finish()
+        self.assertEqual({job["state"] for job in jobs}, {"succeeded"})
         self.kill()
         self.assertTidy(self.listed(), self.datasets())
+        print(f"{KILLS} kills while uploading and deleting, {deleted} versions deleted, {len(jobs)} jobs, seed {SEED}")
 
     def test_a_daemon_that_is_stopped_leaves_its_job_for_the_next(self):
         self.begin("m")
