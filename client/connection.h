@@ -45,6 +45,7 @@ struct ConnectionOptions {
   std::filesystem::path ca;                ///< PEM: whom to trust; empty: the authorities that the system trusts
   std::filesystem::path certificate, key;  ///< PEM: the client's own, both or neither
   std::string token;                       ///< goes with every call; empty: none
+  int number = 0;                          ///< channels of different numbers do not share a connection
 
   bool encrypted() const { return tls || !ca.empty() || !certificate.empty() || !key.empty(); }
 };

@@ -11,7 +11,7 @@ std::vector<Verb> allVerbs() {
       projectVerb(), synthesizeVerb(), interpolateVerb(), editVerb(),  //
       fitVerb(),     scoreVerb(),      evaluateVerb(),                 //
       sampleVerb(),  renderVerb(),     tokenVerb(),                    //
-      topVerb(),     healthVerb(),                                     //
+      topVerb(),     healthVerb(),     benchVerb(),                   //
   };
 }
 

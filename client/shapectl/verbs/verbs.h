@@ -31,6 +31,7 @@ Verb renderVerb();
 Verb tokenVerb();
 Verb topVerb();
 Verb healthVerb();
+Verb benchVerb();
 
 /// Every verb, in the order of the help.
 std::vector<Verb> allVerbs();
