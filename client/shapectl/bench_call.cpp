@@ -135,6 +135,20 @@ client::LoadCall interpolateCall(const Source& source) {
   return call;
 }
 
+/// What streaming frames costs: a path of one step whose frames are all its first end, so that nothing is solved.
+client::LoadCall framesCall(const Source& source) {
+  if (source.inputs.mesh.empty()) throw InvalidInput("--mesh", "is missing: this method streams copies of a mesh");
+  const auto mesh = readMesh(source.inputs.mesh);
+  v1::InterpolateRequest request;
+  *request.mutable_from() = client::pack(mesh);
+  *request.mutable_to()->mutable_positions() = request.from().positions();
+  request.set_path_steps(1);
+  request.mutable_times()->Resize(static_cast<int>(source.frames()), 0);
+  auto call = unary("/shaped.v1.Shapes/Interpolate", request);
+  call.streams = true;
+  return call;
+}
+
 MarkerSet markersOn(const Vertices& shape) {
   MarkerSet set;
   for (const auto vertex : scattered(shape, kMarkers))
@@ -202,6 +216,7 @@ const std::map<std::string, std::function<client::LoadCall(const Source&)>>& met
       {"score", scoreCall},
       {"edit", editCall},
       {"interpolate", interpolateCall},
+      {"frames", framesCall},
       {"fit", fitCall},
       {"evaluate", evaluateCall},
   };

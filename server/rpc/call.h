@@ -13,6 +13,7 @@
 #include "core/numerics/solved.h"
 #include "server/errors/status.h"
 #include "server/rpc/call_times.h"
+#include "server/rpc/wire_message.h"
 #include "server/scheduling/deadline_timer.h"
 #include "server/scheduling/stopper.h"
 #include "server/scheduling/worker_pool.h"

@@ -83,10 +83,9 @@ class IncomingStreamCall final : public Reactor,
     grpc::Status status;
     try {
       status = call_.guarded([&] {
-        if (has_message)
-          answer = handler_->message(request_, response(), call_);
-        else
-          handler_->end(response(), call_);
+        if (!has_message) return handler_->end(response(), call_);
+        requireWellFormed(request_);
+        answer = handler_->message(request_, response(), call_);
       });
     } catch (const Waiting& waiting) {
       return park(waiting);

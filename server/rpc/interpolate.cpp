@@ -48,7 +48,7 @@ v1::InterpolateResponse summaryOf(const GeodesicCalculus& calculus, const Solved
 }  // namespace
 
 void interpolate(const Limits& limits, const v1::InterpolateRequest& request,
-                 const std::function<void(const v1::InterpolateResponse&)>& write, Call& call) {
+                 const std::function<void(v1::InterpolateResponse&&)>& write, Call& call) {
   check(request, limits);
   const auto from = meshFromProto(request.from(), limits, "from");
   const auto to = shapeFromProto(request.to(), *from.topology, "to");
@@ -72,7 +72,7 @@ void interpolate(const Limits& limits, const v1::InterpolateRequest& request,
     toProto(shape.solution, *from.topology, *frame.mutable_shape());
     toProto(shape, call.workSeconds() - begin, *frame.mutable_report());
     frame.set_smallest_area_ratio(smallestAreaRatio(from.topology->faces(), from.vertices, shape.solution));
-    write(response);
+    write(std::move(response));
   }
 }
 

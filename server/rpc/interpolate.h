@@ -10,6 +10,6 @@ namespace shaped::server {
 
 /// Shapes.Interpolate: writes the summary, then a frame for each time.
 void interpolate(const Limits& limits, const v1::InterpolateRequest& request,
-                 const std::function<void(const v1::InterpolateResponse&)>& write, Call& call);
+                 const std::function<void(v1::InterpolateResponse&&)>& write, Call& call);
 
 }  // namespace shaped::server

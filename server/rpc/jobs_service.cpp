@@ -106,7 +106,7 @@ grpc::ServerUnaryReactor* JobsService::List(grpc::CallbackServerContext* context
 grpc::ServerWriteReactor<v1::WatchJobResponse>* JobsService::Watch(grpc::CallbackServerContext* context,
                                                                    const v1::WatchJobRequest* request) {
   const auto call = std::make_shared<WatchCall>(runtime_, registry_, *context, request->id(), stop_.get_token());
-  call->enter();
+  call->enter(*request);
   return call.get();
 }
 
@@ -120,7 +120,7 @@ grpc::ServerUnaryReactor* JobsService::Cancel(grpc::CallbackServerContext* conte
 grpc::ServerUnaryReactor* JobsService::Wait(grpc::CallbackServerContext* context, const v1::WaitJobRequest* request,
                                             v1::WaitJobResponse* response) {
   const auto call = std::make_shared<WaitCall>(runtime_, registry_, *context, *request, *response, stop_.get_token());
-  call->enter();
+  call->enter(*request);
   return call.get();
 }
 

@@ -20,7 +20,7 @@ template <class Request, class Response>
 class ServerStreamCall final : public grpc::ServerWriteReactor<Response>,
                                public std::enable_shared_from_this<ServerStreamCall<Request, Response>> {
  public:
-  using Write = std::function<void(const Response&)>;
+  using Write = std::function<void(Response&&)>;
   /// Writes answers or throws; runs again from the start after it threw Waiting, before any answer. write throws
   /// Stopped when nobody listens any more.
   using Handler = std::function<void(const Request&, const Write& write, Call&)>;
@@ -50,8 +50,9 @@ class ServerStreamCall final : public grpc::ServerWriteReactor<Response>,
   void work() {
     try {
       end(call_.guarded([this] {
+        requireWellFormed(request_);
         handler_(
-            request_, [this](const Response& message) { write(message); }, call_);
+            request_, [this](Response&& message) { write(std::move(message)); }, call_);
       }));
     } catch (const Waiting& waiting) {
       park(waiting);
@@ -72,10 +73,10 @@ class ServerStreamCall final : public grpc::ServerWriteReactor<Response>,
     if (call_.stopped() && pool_.withdraw(call_.id())) end(call_.stopStatus());
   }
 
-  void write(const Response& message) {
+  void write(Response&& message) {
     std::unique_lock lock(mutex_);
     call_.throwIfStopped();
-    message_ = message;
+    message_ = std::move(message);
     writing_ = true;
     lock.unlock();
     this->StartWrite(&message_);

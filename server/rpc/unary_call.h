@@ -46,7 +46,10 @@ class UnaryCall final : public grpc::ServerUnaryReactor,
  private:
   void work() {
     try {
-      end(call_.guarded([this] { handler_(request_, response_, call_); }));
+      end(call_.guarded([this] {
+        requireWellFormed(request_);
+        handler_(request_, response_, call_);
+      }));
     } catch (const Waiting& waiting) {
       park(waiting);
     }

@@ -21,10 +21,11 @@ WaitCall::WaitCall(Runtime& runtime, JobRegistry& registry, grpc::CallbackServer
       response_(response),
       stop_(std::move(stop)) {}
 
-void WaitCall::enter() {
+void WaitCall::enter(const v1::WaitJobRequest& request) {
   self_ = shared_from_this();
   const auto self = [weak = weak_from_this()] { return weak.lock(); };
   const auto status = call_.guarded([&] {
+    requireWellFormed(request);
     if (timeout_ && (timeout_->seconds() < 0 || timeout_->nanos() < 0))
       throw InvalidInput("timeout", "is negative, want >= 0");
     listener_ = registry_.listen(job_, [self] {

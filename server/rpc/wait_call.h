@@ -23,7 +23,7 @@ class WaitCall final : public grpc::ServerUnaryReactor, public std::enable_share
   /// stop: fires when the daemon stops.
   WaitCall(Runtime& runtime, JobRegistry& registry, grpc::CallbackServerContext& context,
            const v1::WaitJobRequest& request, v1::WaitJobResponse& response, std::stop_token stop);
-  void enter();
+  void enter(const v1::WaitJobRequest& request);
 
  private:
   enum class Cause { kChange, kTimeUp };

@@ -12,9 +12,10 @@ WatchCall::WatchCall(Runtime& runtime, JobRegistry& registry, grpc::CallbackServ
       job_(std::move(job)),
       stop_(std::move(stop)) {}
 
-void WatchCall::enter() {
+void WatchCall::enter(const v1::WatchJobRequest& request) {
   self_ = shared_from_this();
-  const auto status = call_.guarded([this] {
+  const auto status = call_.guarded([&] {
+    requireWellFormed(request);
     listener_ = registry_.listen(job_, [weak = weak_from_this()] {
       if (const auto self = weak.lock()) self->onChange();
     });

@@ -22,7 +22,7 @@ class WatchCall final : public grpc::ServerWriteReactor<v1::WatchJobResponse>,
   /// stop: fires when the daemon stops.
   WatchCall(Runtime& runtime, JobRegistry& registry, grpc::CallbackServerContext& context, std::string job,
             std::stop_token stop);
-  void enter();
+  void enter(const v1::WatchJobRequest& request);
 
  private:
   void onChange();

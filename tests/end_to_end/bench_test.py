@@ -40,6 +40,13 @@ class Bench(DaemonCase):
                 self.assertLessEqual(times["p50"], times["p99"])
                 self.assertLessEqual(times["p99"], times["max"])
 
+    def test_frames_of_any_mesh(self):
+        self.refused("--mesh", "bench", "frames")
+        result = self.bench("frames", "--mesh", self.folder / "tube0.obj", "--frames", 20, "--seconds", 0.2, "--warm-up", 0, "--concurrency", 1)
+        self.assertEqual(result["errors"], [])
+        # 106 vertices of three floats: a call's bytes are at least those of its frames.
+        self.assertGreater(result["received_bytes_per_second"] * result["seconds"], result["answered"] * 20 * 106 * 12)
+
     def test_an_open_loop_sends_what_is_due(self):
         result = self.bench("limits", "--rate", 200, "--arrivals", "fixed", "--seconds", 1, "--warm-up", 0.5)
         self.assertEqual(result["sent"] + result["unsent"], 200)

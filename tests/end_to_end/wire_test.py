@@ -45,8 +45,17 @@ class Wire(DaemonCase):
         self.assertEqual((error["kind"], error["reason"]), ("not_found", "MODEL_NOT_FOUND"))
 
     def test_garbage_is_refused(self):
-        with self.assertRaises(grpc.RpcError):
-            call(self.channel, "/shaped.v1.Jobs/Get", b"\xff\xff\xff")
+        one, many = (lambda data: data), (lambda data: iter([data]))
+        for kind, method, wrap in (("unary_unary", "Models/Get", one), ("unary_unary", "Jobs/Wait", one), ("unary_stream", "Jobs/Watch", one),
+                                   ("unary_stream", "Shapes/Interpolate", one), ("stream_unary", "Datasets/Upload", many),
+                                   ("stream_stream", "Shapes/FitMarkers", many)):
+            with self.subTest(method), self.assertRaises(grpc.RpcError) as raised:
+                answer = getattr(self.channel, kind)("/shaped.v1." + method)(wrap(b"\xff\xff\xff"), timeout=10)
+                list(answer)  # of a stream
+            error = raised.exception
+            self.assertEqual(error.code(), grpc.StatusCode.INVALID_ARGUMENT)
+            self.assertIn("message: is no shaped.v1.", error.details())
+            self.assertIn(b"INVALID_FIELD", dict(error.trailing_metadata())["grpc-status-details-bin"])
 
 
 if __name__ == "__main__":

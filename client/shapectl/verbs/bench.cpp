@@ -46,9 +46,9 @@ struct Bench {
     arguments.option("--seed", seed, "N", "Of the arrivals (1)");
     arguments.option("--model", inputs.model, "NAME", "The model that is asked, and that the inputs are taken from");
     arguments.option("--mesh", inputs.mesh, "MESH",
-                     "Project, score, edit, fit or interpolate to this one, not the model's mean");
+                     "Project, score, edit, fit or interpolate to this one, not the model's mean; any mesh for frames");
     arguments.option("--modes", inputs.modes, "J", "Principal variations to use (all)");
-    arguments.option("--frames", inputs.frames, "N", "Frames of interpolate and fit (30)");
+    arguments.option("--frames", inputs.frames, "N", "Frames of interpolate, frames and fit (30)");
     arguments.option("--path-steps", inputs.path_steps, "K", "Of interpolate (4)");
   }
 
