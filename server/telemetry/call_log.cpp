@@ -2,8 +2,7 @@
 
 #include <fmt/chrono.h>
 #include <fmt/format.h>
-#include <spdlog/async_logger.h>
-#include <spdlog/details/thread_pool.h>
+#include <spdlog/logger.h>
 
 #include <atomic>
 #include <memory>
@@ -71,27 +70,19 @@ std::atomic<std::uint64_t> lost_before{0};  // by logs that have been replaced
 /// The process's log.
 struct Log {
   Log(spdlog::level::level_enum level, bool as_json) : json(as_json) {
-    constexpr std::size_t queue = 8192;
-    pool = std::make_shared<spdlog::details::thread_pool>(queue, 1);
-    logger =
-        std::make_shared<spdlog::async_logger>("shaped", sink, pool, spdlog::async_overflow_policy::overrun_oldest);
-    logger->set_level(level);
-    logger->set_pattern(json ? "%v" : "%Y-%m-%dT%H:%M:%S.%e%z %l %v");
+    logger.set_level(level);
+    logger.set_pattern(json ? "%v" : "%Y-%m-%dT%H:%M:%S.%e%z %l %v");
   }
   ~Log() {
     sink->close();
-    logger.reset();
-    const auto overrun = pool->overrun_counter();
-    pool.reset();  // writes what it still can, and ends
-    lost_before += overrun + sink->lost();
+    lost_before += sink->lost();
   }
 
-  std::uint64_t lost() const { return pool->overrun_counter() + sink->lost(); }
+  std::uint64_t lost() const { return sink->lost(); }
 
   bool json;
   std::shared_ptr<StderrSink> sink = std::make_shared<StderrSink>();
-  std::shared_ptr<spdlog::details::thread_pool> pool;
-  std::shared_ptr<spdlog::logger> logger;
+  spdlog::logger logger{"shaped", sink};
 };
 
 std::mutex mutex;
@@ -112,8 +103,8 @@ void replaceLog(std::shared_ptr<Log> next) {
 
 void write(const std::string& line, Severity severity) {
   const auto log = currentLog();
-  if (!log || !log->logger->should_log(levelOf(severity))) return;
-  log->logger->log(levelOf(severity),
+  if (!log || !log->logger.should_log(levelOf(severity))) return;
+  log->logger.log(levelOf(severity),
                    log->json ? jsonLine(line, severity, std::chrono::system_clock::now()) : oneLine(line));
 }
 
@@ -140,7 +131,7 @@ void startLog(const std::string& level, const std::string& format) {
 
 void setLogLevel(const std::string& level) {
   requireLogLevel(level, "--log");
-  if (const auto log = currentLog()) log->logger->set_level(spdlog::level::from_str(level));
+  if (const auto log = currentLog()) log->logger.set_level(spdlog::level::from_str(level));
 }
 
 void stopLog() { replaceLog(nullptr); }
@@ -189,8 +180,8 @@ void logCall(const CallRecord& record, bool servers_fault) {
                         : servers_fault        ? Severity::kError
                                                : Severity::kWarning;
   const auto log = currentLog();
-  if (!log || !log->logger->should_log(levelOf(severity))) return;
-  log->logger->log(levelOf(severity),
+  if (!log || !log->logger.should_log(levelOf(severity))) return;
+  log->logger.log(levelOf(severity),
                    log->json ? jsonLine(record, severity, std::chrono::system_clock::now()) : textLine(record));
 }
 

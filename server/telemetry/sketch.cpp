@@ -17,11 +17,14 @@ std::int64_t sliceOf(RecentSketch::Clock::time_point time) { return time.time_si
 void Sketch::observe(double seconds) {
   const double place = seconds > kSmallest ? std::log(seconds / kSmallest) / kLogGrowth : 0;
   const auto bucket = static_cast<std::size_t>(std::min(place, static_cast<double>(kBuckets - 1)));
+  counts_.resize(kBuckets);
   ++counts_[bucket];
   ++count_;
 }
 
 void Sketch::merge(const Sketch& other) {
+  if (other.count_ == 0) return;
+  counts_.resize(kBuckets);
   for (std::size_t i = 0; i < kBuckets; ++i) counts_[i] += other.counts_[i];
   count_ += other.count_;
 }

@@ -3,11 +3,13 @@
 #include <array>
 #include <chrono>
 #include <cstdint>
+#include <vector>
 
 namespace shaped::server {
 
 /// Durations counted in buckets that each are 5 % wider than the last, so that any quantile is known to 2.5 %: the idea
-/// of DDSketch (Masson, Rim, Lee 2019) over a fixed range, 1 us to 28 hours. Mergeable: counts add up.
+/// of DDSketch (Masson, Rim, Lee 2019) over a fixed range, 1 us to 28 hours. Mergeable: counts add up. Empty it takes
+/// no memory but its own: a daemon has hundreds, most of methods that nobody calls.
 class Sketch {
  public:
   /// seconds: clamped into the range; what is no number counts as the smallest.
@@ -19,7 +21,7 @@ class Sketch {
 
  private:
   static constexpr std::size_t kBuckets = 520;
-  std::array<std::uint32_t, kBuckets> counts_{};
+  std::vector<std::uint32_t> counts_;  ///< kBuckets, or none while nothing was observed
   std::uint64_t count_ = 0;
 };
 

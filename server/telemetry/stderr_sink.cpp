@@ -26,18 +26,50 @@ int openWithoutBlocking(int descriptor) {
 
 }  // namespace
 
-StderrSink::StderrSink(int descriptor) : descriptor_(descriptor), own_(openWithoutBlocking(descriptor)) {}
+StderrSink::StderrSink(int descriptor)
+    : descriptor_(descriptor), own_(openWithoutBlocking(descriptor)), writer_([this] { writeLines(); }) {}
 
 StderrSink::~StderrSink() {
+  close();
   if (own_ >= 0) ::close(own_);
 }
 
-void StderrSink::close() { give_up_ = (Clock::now() + std::chrono::seconds(1)).time_since_epoch().count(); }
+void StderrSink::close() {
+  if (!writer_.joinable()) return;
+  give_up_ = (Clock::now() + std::chrono::seconds(1)).time_since_epoch().count();
+  {
+    const std::scoped_lock lock(queue_mutex_);
+    closing_ = true;
+  }
+  queue_changed_.notify_one();
+  writer_.join();
+}
 
 void StderrSink::sink_it_(const spdlog::details::log_msg& message) {
   spdlog::memory_buf_t line;
   formatter_->format(message, line);
-  if (!write({line.data(), line.size()})) ++lost_;
+  {
+    const std::scoped_lock lock(queue_mutex_);
+    if (queue_.size() == kLongestQueue) {
+      queue_.pop_front();
+      ++lost_;
+    }
+    queue_.emplace_back(line.data(), line.size());
+  }
+  queue_changed_.notify_one();
+}
+
+void StderrSink::writeLines() {
+  std::unique_lock lock(queue_mutex_);
+  while (true) {
+    queue_changed_.wait(lock, [this] { return closing_ || !queue_.empty(); });
+    if (queue_.empty()) return;
+    const auto line = std::move(queue_.front());
+    queue_.pop_front();
+    lock.unlock();
+    if (!write(line)) ++lost_;
+    lock.lock();
+  }
 }
 
 bool StderrSink::write(std::string_view bytes) {
