@@ -143,6 +143,7 @@ client::LoadCall framesCall(const Source& source) {
   *request.mutable_from() = client::pack(mesh);
   *request.mutable_to()->mutable_positions() = request.from().positions();
   request.set_path_steps(1);
+  request.set_bending(1e-4);  // any: the default asks for the mesh's diameter, seconds at 40,000 vertices
   request.mutable_times()->Resize(static_cast<int>(source.frames()), 0);
   auto call = unary("/shaped.v1.Shapes/Interpolate", request);
   call.streams = true;
