@@ -98,6 +98,7 @@ std::shared_ptr<grpc::Channel> connect(const ConnectionOptions& options) {
   arguments.SetMaxSendMessageSize(-1);
   if (!target.authority.empty()) arguments.SetString(GRPC_ARG_DEFAULT_AUTHORITY, target.authority);
   retryIdempotentCalls(arguments, target.balanced);
+  if (!options.retries) arguments.SetInt(GRPC_ARG_ENABLE_RETRIES, 0);
   // Channels whose arguments are alike share a connection; gRPC has no say in what this one means.
   arguments.SetInt("shaped.connection", options.number);
   const auto credentials = options.encrypted() ? tlsCredentials(options) : grpc::InsecureChannelCredentials();

@@ -46,6 +46,7 @@ struct ConnectionOptions {
   std::filesystem::path certificate, key;  ///< PEM: the client's own, both or neither
   std::string token;                       ///< goes with every call; empty: none
   int number = 0;                          ///< channels of different numbers do not share a connection
+  bool retries = true;                     ///< whether calls that may be repeated are, when they fail
 
   bool encrypted() const { return tls || !ca.empty() || !certificate.empty() || !key.empty(); }
 };

@@ -1,5 +1,6 @@
 #include "server/daemon/grpc_log.h"
 
+#include <google/protobuf/stubs/logging.h>
 #include <grpc/support/log.h>
 
 #include <string>
@@ -9,6 +10,8 @@
 namespace shaped::server {
 
 void takeGrpcLog() {
+  // What it says of clients' bytes, their answer and the log say too; it would write past the queue.
+  google::protobuf::SetLogHandler(nullptr);
   gpr_set_log_function([](gpr_log_func_args* entry) { logWarning(std::string("grpc: ") + entry->message); });
 }
 
