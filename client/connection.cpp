@@ -118,6 +118,7 @@ const TraceContext& processTrace() {
 
 Call::Call(const CallOptions& options) : on_stop_(options.stop, [this] { context_.TryCancel(); }) {
   context_.AddMetadata(kTraceparent, (options.trace ? *options.trace : processTrace()).child().header());
+  if (!options.priority.empty()) context_.AddMetadata("shaped-priority", options.priority);
   if (options.timeout)
     context_.set_deadline(std::chrono::system_clock::now() +
                           std::chrono::duration_cast<std::chrono::system_clock::duration>(*options.timeout));

@@ -66,6 +66,7 @@ struct CallOptions {
   std::optional<std::chrono::duration<double>> timeout;  ///< of each call; none: the daemon's own limit
   std::stop_token stop;                                  ///< cancels the call on the daemon too
   std::optional<TraceContext> trace{};                   ///< what the call is made on behalf of; none: processTrace()
+  std::string priority{};                                ///< "interactive", "normal", "batch"; empty: normal
 };
 
 /// The context of one call; must outlive it. Carries a traceparent with a span id of its own.

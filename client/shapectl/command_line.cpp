@@ -79,6 +79,9 @@ void declareConnection(CLI::App& app, client::ConnectionOptions& connection, std
 void declareGlobals(CLI::App& app, Session& session, std::string& output) {
   app.add_option("--output", output, "text or json")->check(CLI::IsMember({"text", "json"}))->capture_default_str();
   app.add_option("--timeout", session.timeout, "Longest time of a call [s]")->check(CLI::PositiveNumber);
+  app.add_option("--priority", session.priority, "How urgent calls are: interactive, normal (where not given) or batch")
+      ->check(CLI::IsMember({"interactive", "normal", "batch"}))
+      ->envname("SHAPED_PRIORITY");
 }
 
 /// CLI11 says by its own codes what was wrong; ours has one for a bad command line.
@@ -91,7 +94,7 @@ int parseFailure(const CLI::App& app, const CLI::ParseError& error) {
 int runCommandLine(int argc, char** argv, const std::vector<Verb>& verbs, std::stop_token stop) {
   CLI::App app("shapectl: shape models at the terminal, served by shaped");
   app.footer(kFooter);
-  Session session{.connection = {}, .json = false, .timeout = {}, .stop = std::move(stop)};
+  Session session{.connection = {}, .json = false, .timeout = {}, .priority = {}, .stop = std::move(stop)};
   session.connection.server = "127.0.0.1:50051";
   std::string output = "text", token_file;
   declareConnection(app, session.connection, token_file);

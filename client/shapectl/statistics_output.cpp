@@ -36,8 +36,8 @@ nlohmann::json toJson(const v1::PoolStatistics& pool) {
           {"busy_threads", pool.busy_threads()},
           {"queue_length", pool.queue_length()},
           {"queue_length_limit", pool.queue_length_limit()},
-          {"queue_bytes", pool.queue_bytes()},
-          {"queue_bytes_limit", pool.queue_bytes_limit()},
+          {"bytes_in_flight", pool.bytes_in_flight()},
+          {"bytes_in_flight_limit", pool.bytes_in_flight_limit()},
           {"open_streams", pool.open_streams()},
           {"open_streams_limit", pool.open_streams_limit()}};
 }
@@ -112,11 +112,11 @@ std::string headLine(const Statistics& now, const Statistics* before, const std:
 }
 
 std::string poolLine(const v1::PoolStatistics& pool) {
-  return format("%-9s%u of %u busy, %lu of %lu waiting (", pool.pool().c_str(), pool.busy_threads(), pool.threads(),
+  return format("%-9s%u of %u busy, %lu of %lu waiting, ", pool.pool().c_str(), pool.busy_threads(), pool.threads(),
                 static_cast<unsigned long>(pool.queue_length()),
                 static_cast<unsigned long>(pool.queue_length_limit())) +
-         bytes(pool.queue_bytes()) + " of " + bytes(pool.queue_bytes_limit()) +
-         format("), %lu of %lu streams", static_cast<unsigned long>(pool.open_streams()),
+         bytes(pool.bytes_in_flight()) + " of " + bytes(pool.bytes_in_flight_limit()) +
+         format(" in flight, %lu of %lu streams", static_cast<unsigned long>(pool.open_streams()),
                 static_cast<unsigned long>(pool.open_streams_limit()));
 }
 

@@ -47,8 +47,8 @@ void toProto(const PoolStatistics& pool, v1::PoolStatistics& message) {
   message.set_busy_threads(static_cast<std::uint32_t>(pool.load.busy));
   message.set_queue_length(pool.load.queue_length);
   message.set_queue_length_limit(pool.limits.queue_length);
-  message.set_queue_bytes(pool.load.queue_bytes);
-  message.set_queue_bytes_limit(pool.limits.queue_bytes);
+  message.set_bytes_in_flight(pool.load.bytes_in_flight);
+  message.set_bytes_in_flight_limit(pool.limits.bytes_in_flight);
   message.set_open_streams(pool.load.open_streams);
   message.set_open_streams_limit(pool.limits.open_streams);
 }

@@ -21,7 +21,12 @@ constexpr int kLightThreads = 2;
 constexpr int kResultThreads = 4;
 constexpr std::chrono::hours kLongestHeavyCall(12);
 constexpr std::size_t kWaitingJobs = 64;
-constexpr AdmissionLimits kHeavyLimits{.queue_length = 8, .queue_bytes = 64 << 20, .open_streams = 1};
+constexpr AdmissionLimits kHeavyLimits{.queue_length = 8,
+                                       .bytes_in_flight = 64 << 20,
+                                       .open_streams = 1,
+                                       .client_requests = 5,
+                                       .client_bytes = 64 << 20,
+                                       .client_streams = 1};
 
 /// One request, one thread: parallel loops inside a solver stay in the worker's own arena of one.
 void alone(const std::function<void()>& serve) { runInArena(1, serve); }
@@ -81,6 +86,7 @@ Daemon::Daemon(const DaemonOptions& options)
   for (const auto& [kind, how] : jobKinds(job_context_))
     for (const auto state : {JobState::kSucceeded, JobState::kFailed, JobState::kCancelled})
       metrics_.declareJobs(kind, nameOf(state));
+  for (auto* pool : {&pool_, &light_, &results_}) pool->setAgeing(options.ageing);
   if (!options.metrics.empty())
     scrape_ = std::make_unique<HttpListener>("--metrics", options.metrics, scrapeHandler(metrics_, ready_));
   listen(options.listen);
@@ -135,9 +141,10 @@ void Daemon::reload(const DaemonOptions& options) {
 
 void Daemon::useLimits() {
   setLogLevel(options_.log);
-  pool_.setLimits(options_.admission);
-  light_.setLimits(options_.admission);
-  results_.setLimits(options_.admission);
+  for (auto* pool : {&pool_, &light_, &results_}) {
+    pool->setLimits(options_.admission);
+    pool->setAgeing(options_.ageing);
+  }
   runtime_.longest_call = std::chrono::duration<double>(options_.longest_call);
 }
 

@@ -143,7 +143,7 @@ std::vector<OptionSpec> jobOptions() {
   };
 }
 
-std::vector<OptionSpec> stopAndAdmissionOptions() {
+std::vector<OptionSpec> stopOptions() {
   return {
       numberOption(
           "drain", "S", When::kWhileRunning, 0, kMostSeconds, [](auto& o) -> auto& { return o.drain; },
@@ -151,15 +151,33 @@ std::vector<OptionSpec> stopAndAdmissionOptions() {
       numberOption(
           "grace", "S", When::kWhileRunning, 0, kMostSeconds, [](auto& o) -> auto& { return o.grace; },
           "then: how long running calls may go on before they are cancelled [s]"),
+  };
+}
+
+std::vector<OptionSpec> admissionOptions() {
+  return {
       countOption(
           "queue-length", "N", When::kWhileRunning, kMostCount,
           [](auto& o) -> auto& { return o.admission.queue_length; }, "requests that may wait for a solver thread"),
       countOption(
-          "queue-megabytes", "N", When::kWhileRunning, kMostCount,
-          [](auto& o) -> auto& { return o.admission.queue_bytes; }, "their messages together [MiB]", 1 << 20),
+          "in-flight-megabytes", "N", When::kWhileRunning, kMostCount,
+          [](auto& o) -> auto& { return o.admission.bytes_in_flight; },
+          "messages of requests that wait or run, together [MiB]", 1 << 20),
       countOption(
           "open-streams", "N", When::kWhileRunning, kMostCount,
           [](auto& o) -> auto& { return o.admission.open_streams; }, "streams at a time"),
+      countOption(
+          "client-requests", "N", When::kWhileRunning, kMostCount,
+          [](auto& o) -> auto& { return o.admission.client_requests; }, "requests of one client that wait or run"),
+      countOption(
+          "client-megabytes", "N", When::kWhileRunning, kMostCount,
+          [](auto& o) -> auto& { return o.admission.client_bytes; }, "their messages together [MiB]", 1 << 20),
+      countOption(
+          "client-streams", "N", When::kWhileRunning, kMostCount,
+          [](auto& o) -> auto& { return o.admission.client_streams; }, "streams of one client at a time"),
+      numberOption(
+          "ageing", "S", When::kWhileRunning, 0.001, kMostSeconds, [](auto& o) -> auto& { return o.ageing; },
+          "how long a request waits until it counts as of the next priority [s]"),
   };
 }
 
@@ -221,7 +239,7 @@ const std::vector<OptionSpec>& optionSpecs() {
   static const auto specs = [] {
     std::vector<OptionSpec> all;
     for (auto* group :
-         {servingOptions, jobOptions, stopAndAdmissionOptions, limitOptions, securityOptions, telemetryOptions})
+         {servingOptions, jobOptions, stopOptions, admissionOptions, limitOptions, securityOptions, telemetryOptions})
       for (auto& spec : group()) all.push_back(std::move(spec));
     return all;
   }();

@@ -27,6 +27,7 @@ struct DaemonOptions {
   double grace = 5;                        ///< then: how long running calls may go on [s], >= 0
   double write_patience = 60;              ///< how long a stream waits for a client to take a message [s], > 0
   AdmissionLimits admission;
+  double ageing = 10;  ///< how long a request waits until it counts as of the next priority [s], > 0
   SecurityOptions security;
   Limits limits;  ///< of requests
   ModelStoreOptions models;

@@ -9,10 +9,11 @@
 namespace shaped::server {
 namespace {
 
-constexpr std::array kNames{"INVALID_FIELD",     "MODEL_NOT_FOUND", "NOT_FOUND",     "ALREADY_EXISTS",
-                            "WRONG_STATE",       "SERVER_BUSY",     "TOO_MANY_JOBS", "STORE_LOCKED",
-                            "MEMORY_BUDGET",     "DISK_FULL",       "OUT_OF_MEMORY", "DATA_DAMAGED",
-                            "FILE_FAILURE",      "DEADLINE_EXCEEDED", "CANCELLED",   "INTERNAL"};
+constexpr std::array kNames{"INVALID_FIELD",  "MODEL_NOT_FOUND", "NOT_FOUND",    "ALREADY_EXISTS",    "WRONG_STATE",
+                            "SERVER_BUSY",    "BYTES_IN_FLIGHT", "OPEN_STREAMS", "CLIENT_REQUESTS",   "CLIENT_BYTES",
+                            "CLIENT_STREAMS", "TOO_MANY_JOBS",   "STORE_LOCKED", "MEMORY_BUDGET",     "DISK_FULL",
+                            "OUT_OF_MEMORY",  "DATA_DAMAGED",    "FILE_FAILURE", "DEADLINE_EXCEEDED", "CANCELLED",
+                            "INTERNAL"};
 static_assert(kNames.size() == static_cast<std::size_t>(Reason::kInternal) + 1);
 
 /// Text that a protobuf field may hold: what is no UTF-8 is replaced.
@@ -31,6 +32,30 @@ std::string shortened(const std::string& text, std::size_t longest) {
 }  // namespace
 
 std::string nameOf(Reason reason) { return kNames.at(static_cast<std::size_t>(reason)); }
+
+Reason reasonOf(RefusalCause cause) {
+  switch (cause) {
+    case RefusalCause::kQueueLength:
+      return Reason::kServerBusy;
+    case RefusalCause::kBytesInFlight:
+      return Reason::kBytesInFlight;
+    case RefusalCause::kOpenStreams:
+      return Reason::kOpenStreams;
+    case RefusalCause::kClientRequests:
+      return Reason::kClientRequests;
+    case RefusalCause::kClientBytes:
+      return Reason::kClientBytes;
+    case RefusalCause::kClientStreams:
+      return Reason::kClientStreams;
+    case RefusalCause::kWaitingJobs:
+      return Reason::kTooManyJobs;
+    case RefusalCause::kMemory:
+      return Reason::kOutOfMemory;
+    case RefusalCause::kDisk:
+      return Reason::kDiskFull;
+  }
+  return Reason::kInternal;
+}
 
 grpc::Status statusOf(const ErrorReport& report) {
   const auto message = shortened(report.message, 1000);

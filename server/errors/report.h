@@ -6,6 +6,8 @@
 #include <optional>
 #include <string>
 
+#include "server/scheduling/refusal.h"
+
 namespace shaped::server {
 
 /// Why a request was not served, for programs: the `reason` of google.rpc.ErrorInfo. Part of the API (docs/api.md):
@@ -16,7 +18,12 @@ enum class Reason {
   kNotFound,          ///< no such dataset or job
   kAlreadyExists,     ///< the name holds something else
   kWrongState,        ///< not possible as things stand, whatever the request says
-  kServerBusy,        ///< refused at the door; google.rpc.RetryInfo says when to come back
+  kServerBusy,        ///< refused at the door: too many requests wait; google.rpc.RetryInfo says when to come back
+  kBytesInFlight,     ///< likewise: the messages of all requests are too large together
+  kOpenStreams,       ///< likewise: too many streams are open
+  kClientRequests,    ///< likewise: too many requests of this client are in flight
+  kClientBytes,       ///< likewise: their messages are too large together
+  kClientStreams,     ///< likewise: too many streams of this client are open
   kTooManyJobs,       ///< too many jobs wait
   kStoreLocked,       ///< another program keeps a file of the store locked
   kMemoryBudget,      ///< a model does not fit into the memory budget
@@ -30,6 +37,8 @@ enum class Reason {
 };
 /// "INVALID_FIELD" and so on.
 std::string nameOf(Reason reason);
+/// Of a refusal.
+Reason reasonOf(RefusalCause cause);
 
 /// Everything that is told of a failure.
 struct ErrorReport {

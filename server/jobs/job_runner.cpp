@@ -314,7 +314,7 @@ void JobRunner::run(const JobRecord& job) {
     if (kind == kinds_.end()) throw NotFound("this daemon knows no jobs of kind \"" + job.kind + "\"");
     fs::create_directories(run.folder);
     JobResult result;
-    runInArena(limits_.threads, [&] { result = kind->second.work(run); });
+    runInBackground(limits_.threads, [&] { result = kind->second.work(run); });
     how_it_ended = [result](JobRecord& record) { markEnded(record, result); };
   } catch (const Stopped&) {
   } catch (...) {

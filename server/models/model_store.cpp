@@ -23,7 +23,7 @@ std::string megabytes(std::size_t bytes) { return std::to_string((bytes + (1 << 
 }  // namespace
 
 ModelStore::ModelStore(const std::filesystem::path& root, const ModelStoreOptions& options)
-    : directory_(root), options_(options), loaders_(options.loaders, {}, {}) {
+    : directory_(root), options_(options), loaders_(options.loaders, noLimits(), {}) {
   for (const auto& name : directory_.models()) {
     newest_[name] = static_cast<std::uint64_t>(directory_.versions(name).back());
     for (const auto& [label, version] : directory_.labels(name))
@@ -103,8 +103,10 @@ PendingModelPtr ModelStore::startLoad(const Key& key) {
   auto& slot = slots_[key];
   if (slot.pending) return slot.pending;
   slot.pending = std::make_shared<PendingModel>();
-  loaders_.submit(++loads_, 0, server::Entry::kContinuation,
-                  [this, key, pending = slot.pending] { runLoad(key, pending); });
+  loaders_.submit(++loads_, {}, 0, [this, key, pending = slot.pending, id = loads_] {
+    runLoad(key, pending);
+    loaders_.leave(id);
+  });
   return slot.pending;
 }
 

@@ -1,7 +1,5 @@
 #include "server/rpc/call.h"
 
-#include <grpc/grpc_security_constants.h>
-
 #include <algorithm>
 
 #include "server/errors/errors.h"
@@ -20,18 +18,6 @@ double secondsSince(std::chrono::steady_clock::time_point begin) {
   return std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count();
 }
 
-/// For the log only: before the call came here, server/security/transport.cpp let it through by the same credentials.
-Credentials credentialsOf(const grpc::CallbackServerContext& context) {
-  Credentials credentials;
-  const auto& metadata = context.client_metadata();
-  if (const auto found = metadata.find("authorization"); found != metadata.end())
-    credentials.authorization = {found->second.data(), found->second.size()};
-  if (const auto peer = context.auth_context())
-    for (const auto& name : peer->FindPropertyValues(GRPC_X509_CN_PROPERTY_NAME))
-      credentials.common_name = {name.data(), name.size()};
-  return credentials;
-}
-
 /// What the caller says of its trace; nothing when it says nothing, or not exactly one valid thing.
 std::optional<TraceContext> parentOf(const grpc::CallbackServerContext& context) {
   const auto [first, end] = context.client_metadata().equal_range(kTraceparent);
@@ -48,7 +34,7 @@ Call::Call(const Runtime& runtime, grpc::CallbackServerContext& context, std::st
       metrics_(runtime.metrics),
       id_(nextRequestId()),
       method_(std::move(method)),
-      client_(runtime.access ? runtime.access->nameOf(credentialsOf(context)) : ""),
+      client_(nameOfCaller(runtime.access, context)),
       counts_(runtime.metrics.method(method_)),
       parent_(parentOf(context)),
       trace_(parent_ ? parent_->child() : newTrace()),
@@ -58,6 +44,8 @@ Call::Call(const Runtime& runtime, grpc::CallbackServerContext& context, std::st
   counts_.began();
   context_.AddInitialMetadata(kTraceparent, trace_.header());
 }
+
+Caller Call::caller() const { return {clientKey(client_, context_.peer()), priorityOf(context_)}; }
 
 void Call::throwIfStopped() const {
   if (stopped()) throw Stopped();
@@ -76,6 +64,7 @@ grpc::Status Call::guarded(const std::function<void()>& work) {
   grpc::Status status;
   try {
     throwIfStopped();
+    priorityOf(context_);
     work();
   } catch (const Waiting&) {
     times_.enter(CallTimes::Phase::kResting);
@@ -105,7 +94,7 @@ grpc::Status Call::refusal(const Decision& decision) {
   metrics_.refused(decision.cause);
   context_.AddTrailingMetadata("grpc-retry-pushback-ms", std::to_string(decision.retry_after.count()));
   return statusOf(
-      ErrorReport{grpc::RESOURCE_EXHAUSTED, decision.reason, Reason::kServerBusy, {}, decision.retry_after});
+      ErrorReport{grpc::RESOURCE_EXHAUSTED, decision.reason, reasonOf(decision.cause), {}, decision.retry_after});
 }
 
 DeadlineTimer::Clock::time_point Call::deadline() const {

@@ -13,11 +13,11 @@
 #include "core/numerics/solved.h"
 #include "server/errors/status.h"
 #include "server/rpc/call_times.h"
+#include "server/rpc/caller.h"
 #include "server/rpc/wire_message.h"
 #include "server/scheduling/deadline_timer.h"
 #include "server/scheduling/stopper.h"
 #include "server/scheduling/worker_pool.h"
-#include "server/security/access.h"
 #include "server/telemetry/metrics.h"
 #include "trace/trace_context.h"
 
@@ -41,7 +41,7 @@ struct Runtime {
 
 /// What every call has, whatever its shape: an id, a place in a trace, a deadline, a stop token, one line in the log,
 /// its share in the counts. Handlers see this class; the reactors that own it are in unary_call.h, server_stream_call.h
-/// and incoming_stream_call.h.
+/// and incoming_stream_call.h (and wait_call.h and watch_call.h, which need no worker).
 class Call {
  public:
   /// method: as the counts have it, "Shapes.Project". cap: the longest that the server works on it, whatever the
@@ -50,6 +50,8 @@ class Call {
        std::chrono::duration<double> cap);
 
   std::uint64_t id() const { return id_; }
+  /// For the pools: whose call it is and how urgent. Throws InvalidInput when its metadata do not say that properly.
+  Caller caller() const;
   /// Fires when the client cancels or goes away, the deadline passes, or the daemon stops. Give it to every solver.
   std::stop_token stopToken() const { return stopper_.token(); }
   /// Throws Stopped once the token has fired.
@@ -68,7 +70,8 @@ class Call {
   /// Within guarded(): runs what waits for the client, which is nobody's work.
   void waitForClient(const std::function<void()>& wait);
 
-  /// Runs a piece of work and turns its exceptions into a status, all but Waiting.
+  /// Runs a piece of work and turns its exceptions into a status, all but Waiting. A call whose metadata are faulty is
+  /// told so instead.
   grpc::Status guarded(const std::function<void()>& work);
   /// Fires the token. The client's own deadline is told from a cancellation by the clock.
   void stop(StopReason reason);

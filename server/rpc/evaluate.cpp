@@ -66,8 +66,7 @@ JobResult run(const JobContext& context, const JobRun& run) {
   const ShellPgaEvaluationResumption resumption{
       [&](const auto& state) { result.offer([&](const auto& path) { writeEvaluationState(path, state); }); },
       from ? &*from : nullptr};
-  const auto solved =
-      evaluate(model, dataset.shapes, optionsFrom(request, model, run.stop), run.progress, resumption);
+  const auto solved = evaluate(model, dataset.shapes, optionsFrom(request, model, run.stop), run.progress, resumption);
   if (solved.termination == Termination::kCancelled) return result.stopped();
   v1::GetJobResultResponse answer;
   const std::chrono::duration<double> seconds = std::chrono::steady_clock::now() - begin;
@@ -86,7 +85,7 @@ void evaluate(ModelStore& models, DatasetStore& datasets, int threads, const v1:
   const auto dataset = datasets.load(datasetInfoFor(*served, datasets, request.dataset()).name);
   const auto options = optionsFrom(request, model, call.stopToken());
   Solved<ShellPgaEvaluation> solved;
-  runInArena(threads, [&] { solved = evaluate(model, dataset.shapes, options, {}); });
+  runInBackground(threads, [&] { solved = evaluate(model, dataset.shapes, options, {}); });
   setAnswer(*served, solved, areaRatio(model, dataset), call, response);
   fill(solved.solution, response);
 }

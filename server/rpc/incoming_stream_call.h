@@ -45,9 +45,10 @@ class IncomingStreamCall final : public Reactor,
 
   void enter() {
     self_ = this->shared_from_this();
-    const std::scoped_lock lock(mutex_);
-    const auto decision = pool_.openStream();
-    has_place_ = decision.admitted;
+    const Lock lock(mutex_);
+    Caller caller;
+    if (const auto proper = call_.guarded([&] { caller = call_.caller(); }); !proper.ok()) return end(proper);
+    const auto decision = pool_.openStream(call_.id(), caller);
     decision.admitted ? read() : end(call_.refusal(decision));
   }
 
@@ -72,8 +73,7 @@ class IncomingStreamCall final : public Reactor,
     if (call_.stopped()) return end(call_.stopStatus());
     state_ = State::kWorking;
     call_.queued();
-    pool_.submit(call_.id(), ok ? request_.ByteSizeLong() : 0, Entry::kContinuation,
-                 [self = this->shared_from_this(), ok] { self->work(ok); });
+    pool_.proceed(call_.id(), messageBytes(ok), [self = this->shared_from_this(), ok] { self->work(ok); });
   }
 
   /// On a worker, without the lock: the state keeps everyone else away from request and response.
@@ -111,7 +111,7 @@ class IncomingStreamCall final : public Reactor,
     if (state_ != State::kParked) return;
     state_ = State::kWorking;
     call_.queued();
-    pool_.submit(call_.id(), 0, Entry::kContinuation, [self = this->shared_from_this()] { self->work(true); });
+    pool_.proceed(call_.id(), messageBytes(true), [self = this->shared_from_this()] { self->work(true); });
   }
 
   void write() {
@@ -137,15 +137,18 @@ class IncomingStreamCall final : public Reactor,
 
   void end(const grpc::Status& status) {
     state_ = State::kEnded;
-    if (call_.finishOnce(status)) this->Finish(status);
+    if (!call_.finishOnce(status)) return;
+    pool_.leave(call_.id());  // before the answer, as PooledCall does
+    this->Finish(status);
   }
+
+  std::size_t messageBytes(bool has_message) const { return has_message ? request_.ByteSizeLong() : 0; }
 
   Response& response() { return kAnswersEach ? own_response_ : *final_response_; }
 
   void OnCancel() override { onStop(StopReason::kClient); }
   void OnDone() override {
     runtime_.timer.cancel(timer_);
-    if (has_place_) pool_.closeStream();
     const auto self = std::move(self_);
   }
 
@@ -160,7 +163,6 @@ class IncomingStreamCall final : public Reactor,
   std::recursive_mutex mutex_;
   State state_ = State::kReading;
   DeadlineTimer::Id timer_;
-  bool has_place_ = false;
   Request request_;
   Response own_response_;
   std::shared_ptr<IncomingStreamCall> self_;

@@ -7,38 +7,28 @@ namespace shaped::server {
 
 /// Why the daemon turned something away that was not wrong in itself.
 enum class RefusalCause {
-  kQueueLength,  ///< too many requests wait for a worker
-  kQueueBytes,   ///< their messages together are too large
-  kOpenStreams,  ///< too many streams are open
-  kWaitingJobs,  ///< too many jobs wait
-  kStoreLock,    ///< another program keeps a file of the store locked
-  kMemory,       ///< no memory for this request
-  kDisk,         ///< the store's disk is full
+  kQueueLength,     ///< too many requests wait for a worker
+  kBytesInFlight,   ///< the messages of all requests together are too large
+  kOpenStreams,     ///< too many streams are open
+  kClientRequests,  ///< too many requests of this client are in flight
+  kClientBytes,     ///< their messages together are too large
+  kClientStreams,   ///< too many streams of this client are open
+  kWaitingJobs,     ///< too many jobs wait
+  kStoreLock,       ///< another program keeps a file of the store locked
+  kMemory,          ///< no memory for this request
+  kDisk,            ///< the store's disk is full
 };
 
-inline constexpr std::array kRefusalCauses{RefusalCause::kQueueLength, RefusalCause::kQueueBytes,
-                                           RefusalCause::kOpenStreams, RefusalCause::kWaitingJobs,
-                                           RefusalCause::kStoreLock,   RefusalCause::kMemory,
-                                           RefusalCause::kDisk};
+inline constexpr std::array kRefusalCauses{
+    RefusalCause::kQueueLength, RefusalCause::kBytesInFlight, RefusalCause::kOpenStreams, RefusalCause::kClientRequests,
+    RefusalCause::kClientBytes, RefusalCause::kClientStreams, RefusalCause::kWaitingJobs, RefusalCause::kStoreLock,
+    RefusalCause::kMemory,      RefusalCause::kDisk};
 
 constexpr std::string_view name(RefusalCause cause) {
-  switch (cause) {
-    case RefusalCause::kQueueLength:
-      return "queue_length";
-    case RefusalCause::kQueueBytes:
-      return "queue_bytes";
-    case RefusalCause::kOpenStreams:
-      return "open_streams";
-    case RefusalCause::kWaitingJobs:
-      return "waiting_jobs";
-    case RefusalCause::kStoreLock:
-      return "store_lock";
-    case RefusalCause::kMemory:
-      return "memory";
-    case RefusalCause::kDisk:
-      return "disk";
-  }
-  return "unknown";
+  constexpr std::array<std::string_view, kRefusalCauses.size()> names{
+      "queue_length",   "bytes_in_flight", "open_streams", "client_requests", "client_bytes",
+      "client_streams", "waiting_jobs",    "store_lock",   "memory",          "disk"};
+  return names.at(static_cast<std::size_t>(cause));
 }
 
 }  // namespace shaped::server

@@ -1,11 +1,15 @@
 #include "server/scheduling/worker_pool.h"
 
-#include <algorithm>
 #include <chrono>
 
 namespace shaped::server {
+namespace {
 
-WorkerPool::WorkerPool(int threads, AdmissionLimits limits, const Around& around) : limits_(limits) {
+using Clock = std::chrono::steady_clock;
+
+}  // namespace
+
+WorkerPool::WorkerPool(int threads, AdmissionLimits limits, const Around& around) : queue_(threads, limits) {
   for (int i = 0; i < threads; ++i)
     threads_.emplace_back([this, around] { around ? around([this] { serve(); }) : serve(); });
 }
@@ -19,78 +23,75 @@ WorkerPool::~WorkerPool() {
   for (auto& thread : threads_) thread.join();
 }
 
-Decision WorkerPool::submit(std::uint64_t id, std::size_t bytes, Entry entry, std::function<void()> work) {
+Decision WorkerPool::submit(std::uint64_t id, const Caller& caller, std::size_t bytes, Work work) {
   {
     const std::scoped_lock lock(mutex_);
-    auto decision = admit(loadLocked(), limits_, entry, bytes);
+    auto decision = queue_.enter(id, caller, Entry::kCall, bytes);
     if (!decision.admitted) return decision;
-    queue_.push_back({id, bytes, std::move(work)});
-    queue_bytes_ += bytes;
+    queue_.push(id, bytes, std::move(work), Clock::now());
   }
   wake_.notify_one();
   return {};
 }
 
+Decision WorkerPool::openStream(std::uint64_t id, const Caller& caller) {
+  const std::scoped_lock lock(mutex_);
+  return queue_.enter(id, caller, Entry::kStream, 0);
+}
+
+void WorkerPool::proceed(std::uint64_t id, std::size_t bytes, Work work) {
+  {
+    const std::scoped_lock lock(mutex_);
+    queue_.push(id, bytes, std::move(work), Clock::now());
+  }
+  wake_.notify_one();
+}
+
 bool WorkerPool::withdraw(std::uint64_t id) {
-  Task taken;  // destroyed after the lock is released: it may own the last reference to a call
+  std::optional<Work> taken;  // destroyed after the lock is released: it may own the last reference to a call
   const std::scoped_lock lock(mutex_);
-  const auto found = std::find_if(queue_.begin(), queue_.end(), [id](const Task& task) { return task.id == id; });
-  if (found == queue_.end()) return false;
-  queue_bytes_ -= found->bytes;
-  taken = std::move(*found);
-  queue_.erase(found);
-  return true;
+  taken = queue_.withdraw(id);
+  return taken.has_value();
 }
 
-Decision WorkerPool::openStream() {
+void WorkerPool::leave(std::uint64_t id) {
   const std::scoped_lock lock(mutex_);
-  auto decision = admit(loadLocked(), limits_, Entry::kStream, 0);
-  if (decision.admitted) ++open_streams_;
-  return decision;
-}
-
-void WorkerPool::closeStream() {
-  const std::scoped_lock lock(mutex_);
-  --open_streams_;
+  queue_.leave(id);
 }
 
 AdmissionLimits WorkerPool::limits() const {
   const std::scoped_lock lock(mutex_);
-  return limits_;
+  return queue_.limits();
 }
 
 Load WorkerPool::load() const {
   const std::scoped_lock lock(mutex_);
-  return loadLocked();
+  return queue_.load();
 }
 
 void WorkerPool::setLimits(const AdmissionLimits& limits) {
   const std::scoped_lock lock(mutex_);
-  limits_ = limits;
+  queue_.setLimits(limits);
 }
 
-Load WorkerPool::loadLocked() const {
-  return {static_cast<int>(threads_.size()), busy_, queue_.size(), queue_bytes_, open_streams_, mean_seconds_};
+void WorkerPool::setAgeing(double seconds) {
+  const std::scoped_lock lock(mutex_);
+  queue_.setAgeing(seconds);
 }
 
 void WorkerPool::serve() {
-  constexpr double memory = 0.9;  // of the moving average, per piece of work
   std::unique_lock lock(mutex_);
   while (true) {
     wake_.wait(lock, [this] { return stopping_ || !queue_.empty(); });
     if (stopping_) return;
-    auto task = std::move(queue_.front());
-    queue_.pop_front();
-    queue_bytes_ -= task.bytes;
-    ++busy_;
+    auto begun = queue_.pop(Clock::now());
     lock.unlock();
-    const auto begin = std::chrono::steady_clock::now();
-    task.work();
-    task.work = nullptr;
-    const double seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count();
+    const auto begin = Clock::now();
+    begun.work();
+    begun.work = nullptr;
+    const double seconds = std::chrono::duration<double>(Clock::now() - begin).count();
     lock.lock();
-    --busy_;
-    mean_seconds_ = mean_seconds_ == 0 ? seconds : memory * mean_seconds_ + (1 - memory) * seconds;
+    queue_.ended(begun.client, seconds);
   }
 }
 

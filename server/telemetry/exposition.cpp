@@ -104,10 +104,10 @@ void addPools(const std::vector<PoolStatistics>& pools, Families& families) {
       [](const auto& pool) { return number(pool.load.queue_length); });
   add("shaped_pool_queue_length_limit", "Requests that may wait",
       [](const auto& pool) { return number(pool.limits.queue_length); });
-  add("shaped_pool_queue_bytes", "Their messages together",
-      [](const auto& pool) { return number(pool.load.queue_bytes); });
-  add("shaped_pool_queue_bytes_limit", "What their messages may take together",
-      [](const auto& pool) { return number(pool.limits.queue_bytes); });
+  add("shaped_pool_bytes_in_flight", "Messages of requests that wait or run",
+      [](const auto& pool) { return number(pool.load.bytes_in_flight); });
+  add("shaped_pool_bytes_in_flight_limit", "What they may take together",
+      [](const auto& pool) { return number(pool.limits.bytes_in_flight); });
   add("shaped_pool_open_streams", "Streams that hold a place",
       [](const auto& pool) { return number(pool.load.open_streams); });
   add("shaped_pool_open_streams_limit", "Streams that may",

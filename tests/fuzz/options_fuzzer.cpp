@@ -30,6 +30,6 @@ FUZZ_TARGET(options) {
   require(options.threads >= 1 && options.threads <= 1024, "threads are in range");
   require(options.longest_call > 0 && options.publish_patience >= 0, "times are in range");
   require(options.admission.queue_length >= 1 && options.admission.open_streams >= 1, "limits are at least 1");
-  require(options.admission.queue_bytes >= 1 << 20, "the queue holds a megabyte");
+  require(options.admission.bytes_in_flight >= 1 << 20, "what is in flight may be a megabyte");
   require(!server::describe(options).empty(), "options can be told");
 }

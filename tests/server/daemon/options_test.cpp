@@ -27,11 +27,11 @@ std::vector<GivenOption> read(const std::string& text) {
 }  // namespace
 
 TEST_CASE("the daemon's options are read") {
-  const auto options = parse({"--listen", "[::1]:7", "--store=dir", "--threads", "3", "--queue-megabytes", "2"});
+  const auto options = parse({"--listen", "[::1]:7", "--store=dir", "--threads", "3", "--in-flight-megabytes", "2"});
   CHECK(options.listen == "[::1]:7");
   CHECK(options.store == "dir");
   CHECK(options.threads == 3);
-  CHECK(options.admission.queue_bytes == 2 << 20);
+  CHECK(options.admission.bytes_in_flight == 2 << 20);
   CHECK(parse({"--store", "dir"}).threads == 8);
 }
 

@@ -9,6 +9,8 @@ using namespace shaped::server;
 
 namespace {
 
+const Caller ann{"ann"};
+
 /// Occupies a worker until released.
 struct Blocker {
   std::promise<void> entered, release;
@@ -27,9 +29,8 @@ TEST_CASE("work runs in the order of its arrival") {
   {
     WorkerPool pool(1, {}, {});
     std::promise<void> done;
-    for (int i = 0; i < 5; ++i)
-      pool.submit(static_cast<std::uint64_t>(i), 1, Entry::kCall, [&, i] { order.push_back(i); });
-    pool.submit(5, 1, Entry::kCall, [&] { done.set_value(); });
+    for (int i = 0; i < 5; ++i) pool.submit(static_cast<std::uint64_t>(i), ann, 1, [&, i] { order.push_back(i); });
+    pool.submit(5, ann, 1, [&] { done.set_value(); });
     done.get_future().wait();
   }
   CHECK(order == std::vector<int>{0, 1, 2, 3, 4});
@@ -44,7 +45,7 @@ TEST_CASE("every worker lives inside its surroundings") {
       prepared = -1;
     });
     std::promise<void> done;
-    pool.submit(1, 0, Entry::kCall, [&] {
+    pool.submit(1, ann, 0, [&] {
       seen = prepared.load();
       done.set_value();
     });
@@ -56,22 +57,23 @@ TEST_CASE("every worker lives inside its surroundings") {
 
 TEST_CASE("a full queue refuses, and withdrawing makes room") {
   Blocker blocker;
-  WorkerPool pool(1, {.queue_length = 2, .queue_bytes = 100, .open_streams = 1}, {});
-  REQUIRE(pool.submit(1, 10, Entry::kCall, blocker.work()).admitted);
+  WorkerPool pool(1, {.queue_length = 2, .bytes_in_flight = 110}, {});
+  REQUIRE(pool.submit(1, ann, 10, blocker.work()).admitted);
   blocker.entered.get_future().wait();
   std::atomic<int> ran{0};
-  CHECK(pool.submit(2, 60, Entry::kCall, [&] { ++ran; }).admitted);
-  CHECK_FALSE(pool.submit(3, 60, Entry::kCall, [&] { ++ran; }).admitted);
-  CHECK(pool.submit(4, 40, Entry::kCall, [&] { ++ran; }).admitted);
-  CHECK_FALSE(pool.submit(5, 0, Entry::kCall, [&] { ++ran; }).admitted);
+  CHECK(pool.submit(2, ann, 60, [&] { ++ran; }).admitted);
+  CHECK_FALSE(pool.submit(3, ann, 60, [&] { ++ran; }).admitted);
+  CHECK(pool.submit(4, ann, 40, [&] { ++ran; }).admitted);
+  CHECK_FALSE(pool.submit(5, ann, 0, [&] { ++ran; }).admitted);
   CHECK(pool.load().queue_length == 2);
-  CHECK(pool.load().queue_bytes == 100);
+  CHECK(pool.load().bytes_in_flight == 110);
   CHECK(pool.withdraw(2));
   CHECK_FALSE(pool.withdraw(2));
   CHECK_FALSE(pool.withdraw(1));  // a worker has it
-  CHECK(pool.load().queue_bytes == 40);
+  pool.leave(2);
+  CHECK(pool.load().bytes_in_flight == 50);
   std::promise<void> done;
-  CHECK(pool.submit(6, 60, Entry::kCall, [&] { done.set_value(); }).admitted);
+  CHECK(pool.submit(6, ann, 60, [&] { done.set_value(); }).admitted);
   blocker.release.set_value();
   done.get_future().wait();
   CHECK(ran == 1);
@@ -80,24 +82,39 @@ TEST_CASE("a full queue refuses, and withdrawing makes room") {
 TEST_CASE("withdrawn work is destroyed outside the pool's lock") {
   Blocker blocker;
   WorkerPool pool(1, {}, {});
-  pool.submit(1, 0, Entry::kCall, blocker.work());
+  pool.submit(1, ann, 0, blocker.work());
   blocker.entered.get_future().wait();
   std::size_t left = 99;
   auto asks_the_pool = std::shared_ptr<int>(new int, [&](int* p) {
     delete p;
     left = pool.load().queue_length;  // deadlocks if the lock is held
   });
-  pool.submit(2, 0, Entry::kCall, [asks_the_pool] {});
+  pool.submit(2, ann, 0, [asks_the_pool] {});
   asks_the_pool.reset();
   CHECK(pool.withdraw(2));
   CHECK(left == 0);
   blocker.release.set_value();
 }
 
-TEST_CASE("streams hold places until they are closed") {
-  WorkerPool pool(1, {.queue_length = 1, .queue_bytes = 1, .open_streams = 1}, {});
-  CHECK(pool.openStream().admitted);
-  CHECK_FALSE(pool.openStream().admitted);
-  pool.closeStream();
-  CHECK(pool.openStream().admitted);
+TEST_CASE("streams hold places until they leave") {
+  WorkerPool pool(1, {.queue_length = 1, .bytes_in_flight = 1, .open_streams = 1}, {});
+  CHECK(pool.openStream(1, ann).admitted);
+  CHECK_FALSE(pool.openStream(2, ann).admitted);
+  std::promise<void> done;
+  pool.proceed(1, 1000, [&] { done.set_value(); });
+  done.get_future().wait();
+  pool.leave(2);  // has none
+  CHECK_FALSE(pool.openStream(2, ann).admitted);
+  pool.leave(1);
+  CHECK(pool.openStream(2, ann).admitted);
+}
+
+TEST_CASE("who calls from a worker's own work finds the pool open") {
+  WorkerPool pool(1, {}, {});
+  std::promise<void> done;
+  pool.submit(1, ann, 0, [&] {
+    pool.leave(1);
+    pool.submit(2, ann, 0, [&] { done.set_value(); });
+  });
+  CHECK(done.get_future().wait_for(std::chrono::seconds(60)) == std::future_status::ready);
 }

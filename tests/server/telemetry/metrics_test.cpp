@@ -13,7 +13,7 @@ namespace {
 
 Surroundings surroundings() {
   Surroundings around;
-  around.pools.push_back({"solver", {.workers = 4, .busy = 3, .queue_length = 7, .queue_bytes = 100}, {}});
+  around.pools.push_back({"solver", {.workers = 4, .busy = 3, .queue_length = 7, .bytes_in_flight = 100}, {}});
   around.models.push_back({"a\"b\\c\nd", 2, 12345});
   around.jobs = {{"failed", 1}, {"running", 2}};
   return around;
