@@ -80,7 +80,7 @@ class BalanceSolver {
     return std::sqrt(std::max(f.dot(solved), 0.0));
   }
 
-  Eigen::VectorXd direction(const Vertices& x, const Eigen::VectorXd& imbalance);
+  Eigen::VectorXd direction(const Vertices& x, const Eigen::VectorXd& imbalance, const std::stop_token& stop);
 
   const ShellStructure& structure_;
   const Topology& topology_;
@@ -96,7 +96,8 @@ class BalanceSolver {
   bool usable_ = false;
 };
 
-Eigen::VectorXd BalanceSolver::direction(const Vertices& x, const Eigen::VectorXd& imbalance) {
+Eigen::VectorXd BalanceSolver::direction(const Vertices& x, const Eigen::VectorXd& imbalance,
+                                         const std::stop_token& stop) {
   const auto measures = measure(topology_, x);
   mixed_.setZero();
   if (unknown_ == Unknown::kDeformed)
@@ -116,7 +117,7 @@ Eigen::VectorXd BalanceSolver::direction(const Vertices& x, const Eigen::VectorX
     metric_.solve(v.data(), y.data());
   };
   Eigen::VectorXd step;
-  gmres(apply, precondition, imbalance, 1e-4, 120, step);  // the map is minus the mixed Hessian
+  gmres(apply, precondition, imbalance, 1e-4, 120, step, stop);  // the map is minus the mixed Hessian
   return step;
 }
 
@@ -135,10 +136,11 @@ bool BalanceSolver::solve(double amount, Vertices& x, const GeodesicOptions& opt
     if (outcome.residual <= options.tolerance) return true;
     if (iteration >= options.max_iterations) return fail(Termination::kIterationLimit);
     if (options.stop.stop_requested()) return fail(Termination::kCancelled);
-    const Eigen::VectorXd step = direction(x, imbalance);
+    const Eigen::VectorXd step = direction(x, imbalance, options.stop);
     const double merit = dualNorm(imbalance);
     double length = 1;
     for (;; length *= 0.5) {
+      if (options.stop.stop_requested()) return fail(Termination::kCancelled);
       if (length < 1.0 / 64) return fail(Termination::kStalled);
       const Vertices trial = x + length * unflatten(step);
       Eigen::VectorXd trial_force = force(trial);
@@ -182,11 +184,13 @@ Solved<Vertices> solveBalance(BalanceSolver solver, const Vertices& start, const
 Solved<Vertices> solveForDeformed(const ShellStructure& structure, const PairEnergy& energy, const Vertices& previous,
                                   const Vertices& current, const Vertices& start, const GeodesicOptions& options,
                                   double force) {
+  if (options.stop.stop_requested()) return {start, Outcome{Termination::kCancelled, 0, 1}};
   return solveBalance(BalanceSolver(structure, energy, current, Unknown::kDeformed, previous, force), start, options);
 }
 
 Solved<Vertices> solveForUndeformed(const ShellStructure& structure, const PairEnergy& energy, const Vertices& current,
                                     const Vertices& next, const Vertices& start, const GeodesicOptions& options) {
+  if (options.stop.stop_requested()) return {start, Outcome{Termination::kCancelled, 0, 1}};
   return solveBalance(BalanceSolver(structure, energy, current, Unknown::kUndeformed, next, 1), start, options);
 }
 

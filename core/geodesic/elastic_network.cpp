@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <memory>
 #include <numeric>
 
@@ -58,10 +59,10 @@ class NetworkNewton {
                                                      : std::make_unique<GeneralBlockMatrix>(structure_->pattern()));
   }
 
-  /// Gradients of all free nodes; the largest relative imbalance.
+  /// Gradients of all free nodes; the largest relative imbalance. Left unfinished when the stop token fires, as is all
+  /// that follows.
   double updateGradient();
-  /// Hessian, couplings and preconditioner; false when a node's block cannot be factorised. Left unfinished when the
-  /// stop token fires, as is the direction.
+  /// Hessian, couplings and preconditioner; false when a node's block cannot be factorised.
   bool updateHessian();
   NodeVectors findDirection(double forcing) const;
   bool step(const NodeVectors& direction);
@@ -124,7 +125,9 @@ double NetworkNewton::nodeGradient(std::size_t n) {
 
 double NetworkNewton::updateGradient() {
   std::vector<double> imbalance(tree_.nodes.size());
-  forEach(tree_.nodes.size(), [&](std::size_t n) { imbalance[n] = nodeGradient(n); });
+  forEach(tree_.nodes.size(), [&](std::size_t n) {
+    if (!stop_.stop_requested()) imbalance[n] = nodeGradient(n);
+  });
   double worst = 0;
   for (const double value : imbalance) worst = std::isnan(value) ? value : std::max(worst, value);
   return worst;
@@ -185,6 +188,7 @@ void NetworkNewton::coupleAdd(std::size_t row, std::size_t column, double scale,
 void NetworkNewton::multiply(const NodeVectors& x, NodeVectors& y) const {
   forEach(x.size(), [&](std::size_t n) {
     y[n].setZero(x[n].size());
+    if (stop_.stop_requested()) return;
     hessians_[n].multiplyAdd(x[n].data(), y[n].data());
     if (tree_.nodes[n].parent >= 0)
       coupleAdd(n, static_cast<std::size_t>(tree_.nodes[n].parent), 1,
@@ -196,6 +200,10 @@ void NetworkNewton::multiply(const NodeVectors& x, NodeVectors& y) const {
 }
 
 void NetworkNewton::solveBlock(std::size_t n, const Eigen::VectorXd& b, Eigen::VectorXd& x) const {
+  if (stop_.stop_requested()) {
+    x.setZero(b.size());
+    return;
+  }
   x.resize(b.size());
   factors_[n].solve(b.data(), x.data());
   x /= tree_.nodes[n].pivot_ratio;
@@ -266,12 +274,13 @@ bool NetworkNewton::step(const NodeVectors& direction) {
   auto measures = measures_;
   const auto moveTo = [&](double t) {
     forEach(direction.size(), [&](std::size_t n) {
+      if (stop_.stop_requested()) return;
       const auto index = static_cast<std::size_t>(tree_.nodes[n].index);
       nodes[index] =
           network_.nodes[index] + t * Eigen::Map<const Vertices>(direction[n].data(), nodes[index].rows(), 3);
       measure(topology_, nodes[index], measures[index]);
     });
-    return energy(measures);
+    return stop_.stop_requested() ? std::numeric_limits<double>::infinity() : energy(measures);
   };
   const double slope = dot(direction, gradient_);
   const double length = slope < 0 ? backtrack(moveTo, energy(measures_), slope, noise_) : 0;
@@ -287,9 +296,12 @@ Solved<ElasticNetwork> relax(const ShellStructurePtr& structure, const PairEnerg
                              const NetworkOptions& options) {
   const auto start = network.nodes;
   NetworkNewton run(structure, energy, std::move(network), options.stop);
-  Outcome outcome;
+  Outcome outcome{Termination::kConverged, 0, 1};
   for (outcome.iterations = 0;; ++outcome.iterations) {
-    outcome.residual = run.updateGradient();
+    const double imbalance = run.updateGradient();
+    outcome.termination = Termination::kCancelled;
+    if (options.stop.stop_requested()) break;
+    outcome.residual = imbalance;
     if (options.on_iteration) options.on_iteration(outcome.iterations, outcome.residual);
     outcome.termination = Termination::kNumericalFailure;
     if (!std::isfinite(outcome.residual)) break;
@@ -298,8 +310,6 @@ Solved<ElasticNetwork> relax(const ShellStructurePtr& structure, const PairEnerg
     if (outcome.residual <= options.tolerance) break;
     outcome.termination = Termination::kIterationLimit;
     if (outcome.iterations >= options.max_iterations) break;
-    outcome.termination = Termination::kCancelled;
-    if (options.stop.stop_requested()) break;
     outcome.termination = Termination::kNumericalFailure;
     if (!run.updateHessian()) break;
     outcome.termination = Termination::kCancelled;
@@ -307,8 +317,10 @@ Solved<ElasticNetwork> relax(const ShellStructurePtr& structure, const PairEnerg
     const double forcing = std::clamp(std::sqrt(outcome.residual), 1e-4, 0.1);
     const auto direction = run.findDirection(forcing);
     if (options.stop.stop_requested()) break;
-    outcome.termination = Termination::kStalled;
-    if (!run.step(direction)) break;
+    if (!run.step(direction)) {
+      outcome.termination = options.stop.stop_requested() ? Termination::kCancelled : Termination::kStalled;
+      break;
+    }
   }
   // A step that the stop token interrupted was not taken.
   if (outcome.termination == Termination::kCancelled && options.on_iterate) options.on_iterate(outcome, run.network());

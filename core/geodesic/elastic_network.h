@@ -44,8 +44,8 @@ struct NetworkOptions {
 ///
 /// The residual is, over free nodes, the largest ratio of the norm of the node's gradient to the sum of the norms of
 /// its segments' forces: 0 where the forces balance. Runs parallel loops over nodes in the current TBB arena; the
-/// result does not depend on the number of threads. Cancellation is polled at every node's factorisation and every
-/// inner iteration. Rigid motions of the free nodes stay as they were at the start up to the six unknowns pinned.
+/// result does not depend on the number of threads. Cancellation is polled at every node of every stage; a step that it
+/// interrupts is not taken. Rigid motions of the free nodes stay as they were at the start up to the six unknowns pinned.
 Solved<ElasticNetwork> relax(const ShellStructurePtr& structure, const PairEnergy& energy, ElasticNetwork network,
                              const NetworkOptions& options);
 

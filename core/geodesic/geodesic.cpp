@@ -15,6 +15,12 @@ namespace {
 
 Outcome worse(Outcome a, const Outcome& b) { return a += b; }
 
+Solved<Path> cancelledPath(const Vertices& a, const Vertices& b, int steps) {
+  Path untouched(static_cast<std::size_t>(steps), a);
+  untouched.push_back(b);
+  return {std::move(untouched), Outcome{Termination::kCancelled, 0, 1}};
+}
+
 Vertices aligned(const Vertices& shape, const Vertices& to) { return apply(alignRigidly(shape, to), shape); }
 
 }  // namespace
@@ -73,6 +79,7 @@ Solved<Path> GeodesicCalculus::cascade(const Vertices& a, const Vertices& b, int
   while (static_cast<int>(path.size()) - 1 < steps) {
     Path finer{path.front()};
     for (std::size_t k = 0; k + 1 < path.size(); ++k) {
+      if (options.stop.stop_requested()) return cancelledPath(a, b, steps);
       auto middle = between(path[k], path[k + 1], 0.5, rough);
       outcome = worse(outcome, middle);
       finer.push_back(std::move(middle.solution));
@@ -113,9 +120,7 @@ Solved<Path> GeodesicCalculus::interpolate(const Vertices& a, const Vertices& b,
   const double direct = energy_.value(topology(), measure(topology(), a), measure(topology(), b));
   Path start = startPath(a, aligned(b, a), steps, options.stop);
   if (options.stop.stop_requested()) {
-    Path untouched(static_cast<std::size_t>(steps), a);
-    untouched.push_back(b);
-    return {std::move(untouched), Outcome{Termination::kCancelled, 0, 1}};
+    return cancelledPath(a, b, steps);
   }
   if (!start.empty() && pathEnergy(start) <= 2 * direct) {
     start.back() = b;

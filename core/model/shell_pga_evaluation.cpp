@@ -65,7 +65,8 @@ class FoldEvaluator {
     const Submanifold submanifold(std::make_shared<GeodesicCalculus>(calculus_),
                                   std::make_shared<ShellPga>(std::move(pga.solution)));
     const auto linear = linearPca(kept);
-    for (const auto& shape : left_out) outcome += addErrors(submanifold, linear, shape, sums);
+    for (const auto& shape : left_out)
+      if (!options_.stop.stop_requested()) outcome += addErrors(submanifold, linear, shape, sums);
     return outcome;
   }
 
@@ -117,7 +118,7 @@ double specificity(const ShellPgaModel& model, const std::vector<Vertices>& shap
   std::mt19937 random(options.seed);
   std::normal_distribution<double> normal;
   double sum = 0;
-  for (int sample = 0; sample < options.specificity_samples; ++sample) {
+  for (int sample = 0; sample < options.specificity_samples && !options.stop.stop_requested(); ++sample) {
     Eigen::VectorXd y = Eigen::VectorXd::Zero(model.modes());
     for (int j = 0; j < modes; ++j) y[j] = normal(random) * std::sqrt(std::max(model.pga().eigenvalues[j], 0.0));
     SubmanifoldOptions submanifold_options;

@@ -56,7 +56,11 @@ Solved<Vertices> finishAtFullResolution(const ShellPgaModel& model, const std::v
 /// coarse mesh, from which the solution starts.
 Vertices solveAtFullResolution(const ShellPgaModel& model, const SubmanifoldPoint& coefficients,
                                const Vertices& coarse_local, const std::stop_token& stop, Outcome& outcome) {
-  const Vertices start = model.prolongate(coarse_local);
+  Vertices start = model.prolongate(coarse_local);
+  if (stop.stop_requested()) {
+    outcome.termination = Termination::kCancelled;
+    return start;
+  }
   auto solved = model.fineSubmanifold()->shapeOf(coefficients, submanifoldOptions(0, stop), &start);
   outcome += solved;
   return std::move(solved.solution.shape);
@@ -131,6 +135,11 @@ Solved<ShellPgaEdit> edit(const ShellPgaModel& model, const std::vector<Handle>&
   result.energies = std::move(coarse.solution.energies);
   result.coefficients = coarse.solution.projection.point;
   result.projection = model.prolongate(coarse.solution.projection.shape);
+  if (options.stop.stop_requested()) {
+    result.shape = model.prolongate(coarse.solution.shape);
+    outcome.termination = Termination::kCancelled;
+    return {std::move(result), outcome};
+  }
   const auto fine =
       finishAtFullResolution(model, handles, result.projection, model.prolongate(coarse.solution.shape), options.stop);
   outcome += fine;

@@ -21,10 +21,10 @@ void requireShapes(const ShellPgaTrainingSet& set) {
 }
 
 /// Two shapes alike up to a rigid motion carry no second observation and leave the Gram matrix without meaning.
-void requireDistinct(const std::vector<Vertices>& coarse) {
+void requireDistinct(const std::vector<Vertices>& coarse, const std::stop_token& stop) {
   const double size = boundingBoxDiagonal(coarse.front());
   for (std::size_t i = 0; i < coarse.size(); ++i)
-    for (std::size_t j = 0; j < i; ++j)
+    for (std::size_t j = 0; j < i && !stop.stop_requested(); ++j)
       if (rmsVertexDistance(apply(alignRigidly(coarse[i], coarse[j]), coarse[i]), coarse[j]) < 1e-7 * size)
         throw InvalidInput("shapes[" + std::to_string(i) + "]",
                            "is shapes[" + std::to_string(j) + "] up to a rigid motion; remove one of them");
@@ -152,7 +152,7 @@ Solved<ShellPgaModelPtr> trainShellPga(const ShellPgaTrainingSet& set, const She
     coarse.push_back(restrictTo(parts.coarsening, set.shapes[i]));
     requireValidShape(*parts.coarsening.coarse, coarse.back(), "shapes[" + std::to_string(i) + "] on the coarse mesh");
   }
-  requireDistinct(coarse);
+  requireDistinct(coarse, stop);
 
   const GeodesicCalculus calculus(std::make_shared<ShellStructure>(parts.coarsening.coarse),
                                   {parts.bending, parts.symmetry});

@@ -7,7 +7,7 @@
 namespace shaped {
 
 double gmres(const LinearMap& matrix, const LinearMap& preconditioner, const Eigen::VectorXd& b, double reduction,
-             int limit, Eigen::VectorXd& x) {
+             int limit, Eigen::VectorXd& x, const std::stop_token& stop) {
   Eigen::VectorXd r, w, image;
   preconditioner(b, r);
   const double start = r.norm();
@@ -19,7 +19,7 @@ double gmres(const LinearMap& matrix, const LinearMap& preconditioner, const Eig
   g[0] = start;
   std::vector<Eigen::JacobiRotation<double>> rotations;
   int k = 0;
-  for (; k < limit && std::abs(g[k]) > reduction * start; ++k) {
+  for (; k < limit && std::abs(g[k]) > reduction * start && !stop.stop_requested(); ++k) {
     matrix(basis.back(), image);
     preconditioner(image, w);
     const double size = w.norm();

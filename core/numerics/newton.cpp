@@ -1,15 +1,25 @@
 #include "core/numerics/newton.h"
 
 #include <cmath>
+#include <limits>
 
 namespace shaped {
 namespace {
 
-/// One run of the method: current iterate, its gradient, and what is reused from step to step.
+/// One run of the method: current iterate, its gradient, and what is reused from step to step. Polls the stop token around
+/// every factorisation, which itself is not interrupted, and at every value of the line search.
 class NewtonRun {
  public:
-  NewtonRun(NewtonObjective& objective, const CholeskyAnalysisPtr& analysis, const Eigen::VectorXd& start)
-      : objective_(objective), factor_(analysis), hessian_(analysis->pattern()), x_(start), direction_(start.size()) {}
+  NewtonRun(NewtonObjective& objective, const CholeskyAnalysisPtr& analysis, const Eigen::VectorXd& start,
+            std::stop_token stop)
+      : objective_(objective),
+        stop_(std::move(stop)),
+        factor_(analysis),
+        hessian_(analysis->pattern()),
+        x_(start),
+        direction_(start.size()) {}
+
+  bool stopped() const { return stop_.stop_requested(); }
 
   double residual() {
     const double scale = objective_.gradient(x_, gradient_);
@@ -19,12 +29,15 @@ class NewtonRun {
     return norm == 0 ? 0 : norm / scale;
   }
 
-  /// Newton's direction; false when neither Hessian could be factorised.
+  /// Newton's direction; false when neither Hessian could be factorised, or stopped.
   bool findDirection() {
     for (const bool projected : {false, true}) {
       hessian_.setZero();
       objective_.hessian(x_, projected, hessian_);
-      if (!factor_.factorise(hessian_, pins_)) continue;
+      if (stopped()) return false;
+      const bool positive = factor_.factorise(hessian_, pins_);
+      if (stopped()) return false;
+      if (!positive) continue;
       factor_.solve(gradient_.data(), direction_.data());
       direction_ = -direction_;
       if (direction_.allFinite() && direction_.dot(gradient_) < 0) return true;
@@ -32,8 +45,10 @@ class NewtonRun {
     return false;
   }
 
+  /// False when no length lowers the objective, or stopped.
   bool step() {
-    const double length = backtrack([this](double t) { return objective_.value(x_ + t * direction_); },
+    constexpr double never = std::numeric_limits<double>::infinity();
+    const double length = backtrack([&](double t) { return stopped() ? never : objective_.value(x_ + t * direction_); },
                                     objective_.value(x_), direction_.dot(gradient_), objective_.noise());
     x_ += length * direction_;
     return length > 0;
@@ -43,6 +58,7 @@ class NewtonRun {
 
  private:
   NewtonObjective& objective_;
+  std::stop_token stop_;
   CholeskyFactor factor_;
   SymmetricBlockMatrix hessian_;
   Pins pins_;
@@ -60,7 +76,10 @@ double backtrack(const std::function<double(double)>& value, double at_zero, dou
 
 Solved<Eigen::VectorXd> minimise(NewtonObjective& objective, const CholeskyAnalysisPtr& analysis,
                                  const Eigen::VectorXd& start, const NewtonOptions& options) {
-  NewtonRun run(objective, analysis, start);
+  NewtonRun run(objective, analysis, start, options.stop);
+  const auto unless_stopped = [&](Termination otherwise) {
+    return run.stopped() ? Termination::kCancelled : otherwise;
+  };
   Outcome outcome;
   for (outcome.iterations = 0;; ++outcome.iterations) {
     outcome.residual = run.residual();
@@ -72,11 +91,15 @@ Solved<Eigen::VectorXd> minimise(NewtonObjective& objective, const CholeskyAnaly
     outcome.termination = Termination::kIterationLimit;
     if (outcome.iterations >= options.max_iterations) break;
     outcome.termination = Termination::kCancelled;
-    if (options.stop.stop_requested()) break;
-    outcome.termination = Termination::kNumericalFailure;
-    if (!run.findDirection()) break;
-    outcome.termination = Termination::kStalled;
-    if (!run.step()) break;
+    if (run.stopped()) break;
+    if (!run.findDirection()) {
+      outcome.termination = unless_stopped(Termination::kNumericalFailure);
+      break;
+    }
+    if (!run.step()) {
+      outcome.termination = unless_stopped(Termination::kStalled);
+      break;
+    }
     outcome.termination = Termination::kConverged;
   }
   return {outcome.termination == Termination::kNumericalFailure ? start : run.x(), outcome};

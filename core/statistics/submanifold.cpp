@@ -148,6 +148,8 @@ Solved<SubmanifoldPoint> Submanifold::optimiseWeights(const ShellMeasures& targe
   energy = evaluate(q);
   Outcome shape_outcome = solved;  // of the solve that q comes from
   for (outcome.iterations = 0;; ++outcome.iterations) {
+    outcome.termination = Termination::kCancelled;
+    if (options.stop.stop_requested()) break;
     const LocalProjection model(*this, target, vertices, alpha, q);
     const Eigen::VectorXd step = model.step(alpha);
     const double slope = model.gradient.dot(step);
@@ -158,10 +160,8 @@ Solved<SubmanifoldPoint> Submanifold::optimiseWeights(const ShellMeasures& targe
     if (outcome.residual <= options.tolerance) break;
     outcome.termination = Termination::kIterationLimit;
     if (outcome.iterations >= options.max_iterations) break;
-    outcome.termination = Termination::kCancelled;
-    if (options.stop.stop_requested()) break;
     double length = 1;
-    for (; length > 1e-4; length *= 0.5) {
+    for (; length > 1e-4 && !options.stop.stop_requested(); length *= 0.5) {
       auto trial = average(spread(alpha + length * step), q + unflatten(length * (model.response * step)), options);
       const double trial_energy = evaluate(trial.solution);
       if (!(trial_energy <= energy + 1e-4 * length * slope + noise)) continue;
@@ -173,7 +173,7 @@ Solved<SubmanifoldPoint> Submanifold::optimiseWeights(const ShellMeasures& targe
       break;
     }
     outcome.termination = Termination::kStalled;
-    if (length <= 1e-4) break;
+    if (length <= 1e-4 && !options.stop.stop_requested()) break;
   }
   if (!shape_outcome.converged()) outcome += shape_outcome;
   return {SubmanifoldPoint{spread(alpha), 1}, outcome};

@@ -31,5 +31,7 @@ void row8RealTrial();
 void row9VirtualTrials();
 void row10HandleEdits();
 void row11RigidMotions();
+/// Row "stop".
+void stopLatency();
 
 }  // namespace shaped::experiments

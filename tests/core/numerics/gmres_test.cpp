@@ -100,3 +100,20 @@ TEST_CASE("GMRES stops by itself where the Krylov space is exhausted, and on a z
   CHECK(gmres(counted, identity(n), Eigen::VectorXd::Zero(n), 1e-10, 15, x) == 0);
   CHECK(x == Eigen::VectorXd::Zero(n));
 }
+
+TEST_CASE("GMRES ends when it is told to, with what it has") {
+  const int n = 40;
+  const Eigen::MatrixXd matrix = nonSymmetric(n);
+  const Eigen::VectorXd b = Eigen::VectorXd::Random(n);
+  std::stop_source stop;
+  int images = 0;
+  const LinearMap stopping = [&](const Eigen::VectorXd& x, Eigen::VectorXd& y) {
+    if (++images == 5) stop.request_stop();
+    y = matrix * x;
+  };
+  Eigen::VectorXd x, five;
+  const double reached = gmres(stopping, identity(n), b, 1e-12, 60, x, stop.get_token());
+  CHECK(images == 5);
+  CHECK(reached == Approx(gmres(applying(matrix), identity(n), b, 1e-12, 5, five)));
+  CHECK(relativeError(x, five) < 1e-12);
+}

@@ -197,6 +197,35 @@ TEST_CASE("a solve says truthfully how it ended") {
     CHECK(stopping.exact_hessians == 2);
     CHECK(stopping.energy(solved.solution) < stopping.energy(start));
   }
+  SECTION("cancelled within a step: it is not taken, and nothing more is computed") {
+    class Stopping : public DoubleWells {
+     public:
+      explicit Stopping(bool in_value) : DoubleWells(10, 0.3), in_value_(in_value) {}
+      double value(const Eigen::VectorXd& x) override {
+        ++values;
+        if (in_value_) stop.request_stop();
+        return DoubleWells::value(x);
+      }
+      void hessian(const Eigen::VectorXd& x, bool projected, SymmetricBlockMatrix& h) override {
+        if (!in_value_) stop.request_stop();
+        DoubleWells::hessian(x, projected, h);
+      }
+      std::stop_source stop;
+      int values = 0;
+
+     private:
+      const bool in_value_;
+    };
+    for (const bool in_value : {false, true}) {
+      Stopping stopping(in_value);
+      const auto solved = minimise(stopping, analysis, start, {60, 1e-8, stopping.stop.get_token()});
+      CHECK(solved.termination == Termination::kCancelled);
+      CHECK(solved.iterations == 0);
+      CHECK(solved.solution == start);
+      CHECK(stopping.exact_hessians + stopping.projections <= (in_value ? 2 : 1));
+      CHECK(stopping.values == (in_value ? 1 : 0));
+    }
+  }
   SECTION("a converged solve is not called cancelled") {
     const auto solved = minimise(wells, analysis, start, {});
     std::stop_source source;
