@@ -4,12 +4,10 @@
 #include <unistd.h>
 
 #include <algorithm>
-#include <limits>
 
 #include "core/io/file.h"
 #include "core/io/file_error.h"
 #include "core/io/folder.h"
-#include "core/io/json_fields.h"
 #include "core/io/sha256.h"
 #include "core/io/text_scanner.h"
 
@@ -19,8 +17,6 @@ namespace {
 namespace fs = std::filesystem;
 using nlohmann::json;
 
-constexpr const char* kManifest = "manifest.json";
-constexpr const char* kTensors = "tensors.safetensors";
 constexpr std::int64_t kMostVersions = 1'000'000'000'000;
 constexpr const char* kHighestVersion = ".highest-version";  ///< ever given; only written when that version is removed
 
@@ -66,27 +62,6 @@ std::int64_t highestVersion(const fs::path& model_folder) {
   return highest;
 }
 
-std::string toJson(const ModelManifest& manifest) {
-  const json tensors = {{"file", kTensors}, {"bytes", manifest.tensors_bytes}, {"sha256", manifest.tensors_sha256}};
-  const json document = {{"kind", manifest.kind},
-                         {"format_version", manifest.format_version},
-                         {"created_by", manifest.created_by},
-                         {"tensors", tensors},
-                         {"description", manifest.description}};
-  return document.dump(2) + "\n";
-}
-
-void requireManifest(const ModelManifest& manifest) {
-  if (manifest.kind.empty() || manifest.format_version < 1)
-    throw InvalidInput("manifest", "needs a kind and a format version of at least 1");
-  if (!manifest.description.is_object()) throw InvalidInput("manifest.description", "must be a JSON object");
-  try {
-    toJson(manifest);
-  } catch (const json::exception&) {
-    throw InvalidInput("manifest", "holds text that is not UTF-8");
-  }
-}
-
 /// A scratch folder in the model's folder, which is made when it is missing.
 ScratchFolder beginPublishing(const fs::path& folder) {
   for (int attempt = 0;; ++attempt) {
@@ -102,32 +77,45 @@ ScratchFolder beginPublishing(const fs::path& folder) {
   }
 }
 
-ModelManifest readManifest(const fs::path& path) {
+/// Gives a whole version its number. The folder of a model without versions may be removed at any moment by a publisher
+/// that failed.
+std::int64_t nameVersion(ScratchFolder& scratch, const fs::path& folder) {
+  for (int attempt = 0;; ++attempt) {
+    makeFolder(folder);
+    try {
+      const FolderLock lock(folder);
+      const auto version = highestVersion(folder) + 1;
+      scratch.rename(folder / std::to_string(version));
+      return version;
+    } catch (const FileError&) {
+      if (fs::exists(folder) || attempt == 10) throw;
+    }
+  }
+}
+
+ModelManifest parseManifest(const fs::path& path, const std::string& text) {
   try {
-    const auto document = parseJson("manifest", readFile(path));
-    ModelManifest manifest;
-    document.at("kind").get_to(manifest.kind);
-    manifest.format_version =
-        static_cast<int>(requireWholeNumber(document, "format_version", 1, std::numeric_limits<int>::max()));
-    document.at("created_by").get_to(manifest.created_by);
-    document.at("tensors").at("sha256").get_to(manifest.tensors_sha256);
-    manifest.tensors_bytes = static_cast<std::uint64_t>(
-        requireWholeNumber(document.at("tensors"), "bytes", 0, std::numeric_limits<std::int64_t>::max()));
-    manifest.description = document.at("description");
-    if (!manifest.description.is_object()) throw InvalidInput("description", "must be a JSON object");
-    return manifest;
-  } catch (const json::exception& problem) {
-    throw FileError(path.string(), std::string("is no model manifest: ") + problem.what());
+    return manifestFrom(text);
   } catch (const InvalidInput& problem) {
     throw FileError(path.string(), std::string("is no model manifest: ") + problem.what());
   }
 }
 
+std::string readManifestText(const fs::path& path) {
+  try {
+    return readFile(path);
+  } catch (const InvalidInput& problem) {
+    throw FileError(path.string(), std::string("is no model manifest: ") + problem.what());
+  }
+}
+
+ModelManifest readManifest(const fs::path& path) { return parseManifest(path, readManifestText(path)); }
+
 /// Writes both files; the manifest learns size and hash of the tensors while they are written.
 void writeFiles(const fs::path& folder, ModelManifest& manifest, const TensorWriter& tensors) {
   Sha256 hash;
   manifest.tensors_bytes = 0;
-  FileWriter file(folder / kTensors);
+  FileWriter file(folder / kTensorsFile);
   tensors.write([&](std::string_view bytes) {
     hash.update(bytes);
     manifest.tensors_bytes += bytes.size();
@@ -135,12 +123,12 @@ void writeFiles(const fs::path& folder, ModelManifest& manifest, const TensorWri
   });
   file.commit();
   manifest.tensors_sha256 = hash.finish();
-  writeFile(folder / kManifest, toJson(manifest));
+  writeFile(folder / kManifestFile, textOf(manifest));
   syncFolder(folder);
 }
 
-/// Maps the tensors and compares them with what the manifest says of them.
-std::shared_ptr<const TensorFile> readTensors(const fs::path& path, const ModelManifest& manifest) {
+/// Maps the tensors, which must be as long as the manifest says.
+std::shared_ptr<const TensorFile> mapTensors(const fs::path& path, const ModelManifest& manifest) {
   std::shared_ptr<const TensorFile> tensors;
   try {
     tensors = std::make_shared<const TensorFile>(path);
@@ -150,6 +138,12 @@ std::shared_ptr<const TensorFile> readTensors(const fs::path& path, const ModelM
   if (tensors->bytes().size() != manifest.tensors_bytes)
     throw FileError(path.string(), "has " + std::to_string(tensors->bytes().size()) + " bytes, its manifest says " +
                                        std::to_string(manifest.tensors_bytes) + "; restore or remove this version");
+  return tensors;
+}
+
+/// Maps the tensors and compares them with what the manifest says of them.
+std::shared_ptr<const TensorFile> readTensors(const fs::path& path, const ModelManifest& manifest) {
+  auto tensors = mapTensors(path, manifest);
   if (const auto hash = sha256(tensors->bytes()); hash != manifest.tensors_sha256)
     throw FileError(path.string(), "has SHA-256 " + hash + ", its manifest says " + manifest.tensors_sha256 +
                                        "; restore or remove this version");
@@ -200,14 +194,26 @@ fs::path ModelDirectory::folderOf(const std::string& model, std::optional<std::i
 std::int64_t ModelDirectory::publish(const std::string& model, ModelManifest manifest,
                                      const TensorWriter& tensors) const {
   const auto folder = folderOf(model);
-  requireManifest(manifest);
+  textOf(manifest);  // throws before anything is written
   try {
     auto scratch = beginPublishing(folder);
     writeFiles(scratch.path(), manifest, tensors);
-    const FolderLock lock(folder);
-    const auto version = highestVersion(folder) + 1;
-    scratch.rename(folder / std::to_string(version));
-    return version;
+    return nameVersion(scratch, folder);
+  } catch (const FileError&) {
+    ::rmdir(folder.c_str());  // fails, as it should, unless the model is new
+    throw;
+  }
+}
+
+std::unique_ptr<IncomingModel> ModelDirectory::receive(const std::string& model, std::string manifest_text) const {
+  requireName(model);
+  return std::make_unique<IncomingModel>(model, std::move(manifest_text), folder_);
+}
+
+std::int64_t ModelDirectory::publish(IncomingModel& incoming) const {
+  const auto folder = folderOf(incoming.name());
+  try {
+    return nameVersion(incoming.scratch_, folder);
   } catch (const FileError&) {
     ::rmdir(folder.c_str());  // fails, as it should, unless the model is new
     throw;
@@ -215,14 +221,22 @@ std::int64_t ModelDirectory::publish(const std::string& model, ModelManifest man
 }
 
 ModelManifest ModelDirectory::manifest(const std::string& model, std::optional<std::int64_t> version) const {
-  return readManifest(folderOf(model, version) / kManifest);
+  return readManifest(folderOf(model, version) / kManifestFile);
 }
 
 StoredModel ModelDirectory::load(const std::string& model, std::optional<std::int64_t> version) const {
   const auto folder = folderOf(model, version);
-  auto manifest = readManifest(folder / kManifest);
-  auto tensors = readTensors(folder / kTensors, manifest);
+  auto manifest = readManifest(folder / kManifestFile);
+  auto tensors = readTensors(folder / kTensorsFile, manifest);
   return {model, *version, std::move(manifest), std::move(tensors)};
+}
+
+ModelFiles ModelDirectory::files(const std::string& model, std::optional<std::int64_t> version) const {
+  const auto folder = folderOf(model, version);
+  auto text = readManifestText(folder / kManifestFile);
+  auto manifest = parseManifest(folder / kManifestFile, text);
+  auto tensors = mapTensors(folder / kTensorsFile, manifest);
+  return {model, *version, std::move(text), std::move(manifest), std::move(tensors)};
 }
 
 std::vector<std::string> ModelDirectory::models() const {
@@ -242,7 +256,7 @@ std::vector<std::int64_t> ModelDirectory::versions(const std::string& model) con
 
 std::string ModelDirectory::fingerprint(const std::string& model, std::int64_t version) const {
   std::string print;
-  for (const auto* name : {kManifest, kTensors}) {
+  for (const auto* name : {kManifestFile, kTensorsFile}) {
     struct stat status {};
     if (::stat((folderOf(model) / std::to_string(version) / name).c_str(), &status) != 0) continue;
     for (const auto number : {static_cast<std::int64_t>(status.st_ino), static_cast<std::int64_t>(status.st_size),

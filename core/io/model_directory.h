@@ -4,11 +4,12 @@
 #include <filesystem>
 #include <map>
 #include <memory>
-#include <nlohmann/json.hpp>
 #include <optional>
 #include <string>
 #include <vector>
 
+#include "core/io/incoming_model.h"
+#include "core/io/model_manifest.h"
 #include "core/io/tensor_file.h"
 #include "core/numerics/error.h"
 
@@ -20,22 +21,21 @@ class ModelNotFound : public InvalidInput {
   using InvalidInput::InvalidInput;
 };
 
-/// What manifest.json says about a model, whatever its kind.
-struct ModelManifest {
-  std::string kind;                                       ///< names the code that reads the tensors: "shell_pga"
-  int format_version = 1;                                 ///< of that kind's tensors and description, >= 1
-  std::string created_by;                                 ///< program and version: "shaped 0.1.0"
-  nlohmann::json description = nlohmann::json::object();  ///< what the kind wants to say; an object
-  std::string tensors_sha256;                             ///< set by publish(): 64 hexadecimal digits
-  std::uint64_t tensors_bytes = 0;                        ///< set by publish()
-};
-
 /// One version of a model out of the store, verified.
 struct StoredModel {
   std::string name;
   std::int64_t version;
   ModelManifest manifest;
   std::shared_ptr<const TensorFile> tensors;  ///< stays readable when the version is removed
+};
+
+/// The files of one version as they are, to be handed on.
+struct ModelFiles {
+  std::string name;
+  std::int64_t version;
+  std::string manifest_text;
+  ModelManifest manifest;
+  std::shared_ptr<const TensorFile> tensors;  ///< not compared with the manifest's SHA-256
 };
 
 /// A folder of models: <folder>/<model>/<version>/manifest.json and tensors.safetensors. Versions are integers from 1.
@@ -54,11 +54,21 @@ class ModelDirectory {
   /// publishers of the same model left. Throws InvalidInput when the manifest has no kind or no object as description.
   std::int64_t publish(const std::string& model, ModelManifest manifest, const TensorWriter& tensors) const;
 
+  /// Takes in a version from elsewhere, in a scratch folder. Throws InvalidInput when the text is no manifest,
+  /// FileError when the disk fails.
+  std::unique_ptr<IncomingModel> receive(const std::string& model, std::string manifest_text) const;
+  /// Gives what has come, and was finished, the next number; its files are those that were sent, to the bit. Throws
+  /// FileError when the disk fails.
+  std::int64_t publish(IncomingModel& incoming) const;
+
   /// The newest version, or the one asked for. Throws ModelNotFound; FileError when the files are damaged: the manifest
   /// is no manifest, or the tensor file has not the size and SHA-256 that it states.
   StoredModel load(const std::string& model, std::optional<std::int64_t> version = {}) const;
   /// The manifest alone, without looking at the tensors. Throws as load().
   ModelManifest manifest(const std::string& model, std::optional<std::int64_t> version = {}) const;
+
+  /// The files of a version. Throws as load(), but reads the tensors' header only.
+  ModelFiles files(const std::string& model, std::optional<std::int64_t> version = {}) const;
 
   /// Names with at least one version, sorted.
   std::vector<std::string> models() const;

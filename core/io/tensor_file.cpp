@@ -83,8 +83,8 @@ bool isTensorDescription(const json& entry) {
          wholeNumbers("shape") && wholeNumbers("data_offsets") && entry["data_offsets"].size() == 2;
 }
 
-std::string_view mapFile(const std::string& file) {
-  const int descriptor = ::open(file.c_str(), O_RDONLY | O_CLOEXEC | O_NONBLOCK);
+std::string_view mapFile(const std::filesystem::path& path, const std::string& file) {
+  const int descriptor = ::open(path.c_str(), O_RDONLY | O_CLOEXEC | O_NONBLOCK);
   if (descriptor < 0) throw InvalidInput(file, "cannot be opened: " + std::generic_category().message(errno));
   struct stat status {};
   const bool regular = ::fstat(descriptor, &status) == 0 && S_ISREG(status.st_mode);
@@ -100,7 +100,8 @@ std::string_view mapFile(const std::string& file) {
 
 }  // namespace
 
-TensorFile::TensorFile(const std::filesystem::path& path) : file_(path.string()), mapping_(mapFile(file_)) {
+TensorFile::TensorFile(const std::filesystem::path& path, std::string name)
+    : file_(name.empty() ? path.string() : std::move(name)), mapping_(mapFile(path, file_)) {
   try {
     readHeader();
   } catch (...) {

@@ -46,10 +46,11 @@ using RowMajorMatrix = Eigen::Matrix<Number, Eigen::Dynamic, Eigen::Dynamic, Eig
 /// does.
 class TensorFile {
  public:
-  /// Maps and checks the file. Throws InvalidInput naming the file when it cannot be opened or is no regular file, when
-  /// the header is larger than the file or no JSON of that form, holds a name twice or a dtype other than F64, F32, I64
-  /// and I32, or when the tensors do not fill the data exactly one after the other, each aligned to its numbers.
-  explicit TensorFile(const std::filesystem::path& path);
+  /// Maps and checks the file. name: what errors call it; its path where empty. Throws InvalidInput naming the file
+  /// when it cannot be opened or is no regular file, when the header is larger than the file or no JSON of that form,
+  /// holds a name twice or a dtype other than F64, F32, I64 and I32, or when the tensors do not fill the data exactly
+  /// one after the other, each aligned to its numbers.
+  explicit TensorFile(const std::filesystem::path& path, std::string name = {});
   ~TensorFile();
   TensorFile(const TensorFile&) = delete;
   TensorFile& operator=(const TensorFile&) = delete;

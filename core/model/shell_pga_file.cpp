@@ -122,9 +122,7 @@ void requireCoarseShapes(const Topology& coarse, const ShellPga& pga) {
     requireValidShape(coarse, pga.variations[j], "variations[" + std::to_string(j) + "]");
 }
 
-ShellPgaParts partsFrom(const StoredModel& stored) {
-  const auto& tensors = *stored.tensors;
-  const auto& description = stored.manifest.description;
+ShellPgaParts partsFrom(const nlohmann::json& description, const TensorFile& tensors) {
   ShellPgaParts parts;
   parts.template_shape = tensors.matrix<double>("template", -1, 3);
   const auto vertex_count = parts.template_shape.rows();
@@ -194,22 +192,29 @@ std::int64_t publishShellPga(const ModelDirectory& directory, const std::string&
   return directory.publish(name, std::move(manifest), tensors);
 }
 
-ShellPgaModelPtr loadShellPga(const StoredModel& stored) {
-  const std::string version = "model " + stored.name + " version " + std::to_string(stored.version);
-  if (stored.manifest.kind != kShellPgaKind)
-    throw FileError(version, "is of kind \"" + stored.manifest.kind + "\", want \"" + kShellPgaKind + "\"");
-  if (stored.manifest.format_version != kFormatVersion)
-    throw FileError(version, "has format version " + std::to_string(stored.manifest.format_version) + ", want " +
-                                 std::to_string(kFormatVersion) + "; train it again or use the daemon that wrote it");
-  try {
-    auto model = std::make_shared<const ShellPgaModel>(partsFrom(stored));
-    if (!model->mean().allFinite()) throw InvalidInput("mean", "cannot be carried to full resolution");
-    return model;
-  } catch (const InvalidInput& problem) {
-    throw FileError(version, std::string("cannot be used: ") + problem.what());
-  } catch (const nlohmann::json::exception& problem) {
-    throw FileError(version, std::string("has a faulty description: ") + problem.what());
-  }
+void requireShellPga(const ModelManifest& manifest) {
+  if (manifest.kind != kShellPgaKind)
+    throw InvalidInput("manifest", "is of kind \"" + manifest.kind + "\", want \"" + kShellPgaKind + "\"");
+  if (manifest.format_version != kFormatVersion)
+    throw InvalidInput("manifest", "has format version " + std::to_string(manifest.format_version) + ", want " +
+                                       std::to_string(kFormatVersion) +
+                                       "; train it again or use the daemon that wrote it");
+}
+
+ShellPgaModelPtr shellPgaFrom(const ModelManifest& manifest, const TensorFile& tensors) try {
+  requireShellPga(manifest);
+  auto model = std::make_shared<const ShellPgaModel>(partsFrom(manifest.description, tensors));
+  if (!model->mean().allFinite()) throw InvalidInput("mean", "cannot be carried to full resolution");
+  return model;
+} catch (const nlohmann::json::exception& problem) {
+  throw InvalidInput("manifest", std::string("has a faulty description: ") + problem.what());
+}
+
+ShellPgaModelPtr loadShellPga(const StoredModel& stored) try {
+  return shellPgaFrom(stored.manifest, *stored.tensors);
+} catch (const InvalidInput& problem) {
+  throw FileError("model " + stored.name + " version " + std::to_string(stored.version),
+                  std::string("cannot be used: ") + problem.what());
 }
 
 }  // namespace shaped

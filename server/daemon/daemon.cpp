@@ -73,7 +73,7 @@ Daemon::Daemon(const DaemonOptions& options)
                std::chrono::duration<double>(options.write_patience),
                options.threads,
                security_.access()},
-      models_service_(runtime_, models_),
+      models_service_(runtime_, options_.limits, models_),
       datasets_service_(runtime_, options_.limits, datasets_),
       jobs_service_(runtime_, job_context_, job_registry_, jobs_),
       shapes_service_(runtime_, options_.limits, models_, datasets_),

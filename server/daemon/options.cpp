@@ -199,11 +199,13 @@ std::vector<OptionSpec> limitOptions() {
           "max-message-megabytes", "N", When::kAtStart, 1024, [](auto& o) -> auto& { return o.limits.message_bytes; },
           "largest message, either way [MiB]", 1 << 20),
       countOption(
-          "max-job-megabytes", "N", When::kAtStart, kMostMegabytes,
-          [](auto& o) -> auto& { return o.limits.job_bytes; },
+          "max-job-megabytes", "N", When::kAtStart, kMostMegabytes, [](auto& o) -> auto& { return o.limits.job_bytes; },
           "most that is sent for one job, and largest result of one [MiB]", 1 << 20),
-  };
-}
+      "max-upload-megabytes", "N", When::kAtStart, kMostCount, [](auto& o) -> auto& {return o.limits.upload_bytes;
+}, "largest model that an upload may bring [MiB]",
+          1 << 20),
+};  // namespace
+}  // namespace shaped::server
 
 std::vector<OptionSpec> securityOptions() {
   return {

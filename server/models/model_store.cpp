@@ -20,6 +20,14 @@ std::int64_t signedVersion(std::uint64_t version) { return static_cast<std::int6
 
 std::string megabytes(std::size_t bytes) { return std::to_string((bytes + (1 << 20) - 1) >> 20) + " MiB"; }
 
+/// version: 0 for one that has no number yet.
+OverBudget overBudget(const std::string& name, std::uint64_t version, std::size_t bytes, std::size_t budget) {
+  return {"model \"" + name + "\"" + (version == 0 ? "" : " version " + std::to_string(version)) + " needs " +
+              megabytes(bytes) + " of memory, which the budget of " + megabytes(budget) +
+              " for models does not have; unload others or raise --model-megabytes",
+          bytes <= budget};
+}
+
 }  // namespace
 
 ModelStore::ModelStore(const std::filesystem::path& root, const ModelStoreOptions& options)
@@ -103,11 +111,17 @@ PendingModelPtr ModelStore::startLoad(const Key& key) {
   auto& slot = slots_[key];
   if (slot.pending) return slot.pending;
   slot.pending = std::make_shared<PendingModel>();
-  loaders_.submit(++loads_, {}, 0, [this, key, pending = slot.pending, id = loads_] {
-    runLoad(key, pending);
+  onLoader([this, key, pending = slot.pending] { runLoad(key, pending); });
+  return slot.pending;
+}
+
+/// Call with the mutex held.
+void ModelStore::onLoader(std::function<void()> work) {
+  const auto id = ++loads_;
+  loaders_.submit(id, {}, 0, [this, id, work = std::move(work)] {
+    work();
     loaders_.leave(id);
   });
-  return slot.pending;
 }
 
 void ModelStore::runLoad(const Key& key, const PendingModelPtr& pending) {
@@ -188,11 +202,7 @@ void ModelStore::makeRoom(const Key& wanted, std::size_t bytes) {
     slots.push_back(slot);
   }
   const auto plan = planEviction(residents, bytes, options_.memory_budget);
-  if (!plan)
-    throw OverBudget("model \"" + wanted.first + "\" version " + std::to_string(wanted.second) + " needs " +
-                         megabytes(bytes) + " of memory, which the budget of " + megabytes(options_.memory_budget) +
-                         " for models does not have; unload others or raise --model-megabytes",
-                     bytes <= options_.memory_budget);
+  if (!plan) throw overBudget(wanted.first, wanted.second, bytes, options_.memory_budget);
   for (const auto index : *plan) slots_.erase(slots[index]);
 }
 
@@ -277,21 +287,78 @@ std::vector<ServedModelPtr> ModelStore::loaded() const {
 
 ServedModelPtr ModelStore::publish(const std::string& name, ShellPgaModelPtr model, const Provenance& provenance) {
   const auto version = publishShellPga(directory_, name, *model, toJson(provenance));
-  const Key key{name, static_cast<std::uint64_t>(version)};
+  return served({name, static_cast<std::uint64_t>(version)}, directory_.manifest(name, version), std::move(model));
+}
+
+/// A version that was published just now, in memory if the budget allows.
+ServedModelPtr ModelStore::served(const Key& key, ModelManifest manifest, ShellPgaModelPtr model) {
+  const auto& [name, version] = key;
   const auto bytes = model->bytes();
-  auto served = std::make_shared<const ServedModel>(
-      ServedModel{name, key.second, directory_.manifest(name, version), std::move(model), bytes});
+  auto served =
+      std::make_shared<const ServedModel>(ServedModel{name, version, std::move(manifest), std::move(model), bytes});
   {
     const Lock lock(mutex_);
     try {
       makeRoom(key, bytes);
       keep(key, served);
     } catch (const OverBudget&) {  // it is published all the same, and loaded when wanted
-      newest_[name] = std::max(newest_[name], key.second);
+      newest_[name] = std::max(newest_[name], version);
     }
   }
   changed();
   return served;
+}
+
+std::unique_ptr<IncomingModel> ModelStore::receive(const std::string& name, std::string manifest_text) const {
+  auto incoming = directory_.receive(name, std::move(manifest_text));
+  requireShellPga(incoming->manifest());
+  if (const auto bytes = incoming->manifest().tensors_bytes; bytes > options_.memory_budget)
+    throw overBudget(name, 0, bytes, options_.memory_budget);
+  return incoming;
+}
+
+PendingModelPtr ModelStore::publish(std::unique_ptr<IncomingModel> incoming, std::stop_token stop) {
+  auto pending = std::make_shared<PendingModel>();
+  auto work = [this, pending, stop = std::move(stop), files = std::shared_ptr(std::move(incoming))]() mutable {
+    ServedModelPtr model;
+    std::exception_ptr failure;
+    try {
+      model = takeIn(*files, stop);
+    } catch (...) {
+      failure = std::current_exception();
+    }
+    files.reset();  // who is told of a failure finds nothing left
+    pending->finish(std::move(model), failure);
+  };
+  const Lock lock(mutex_);
+  onLoader(std::move(work));
+  return pending;
+}
+
+ServedModelPtr ModelStore::takeIn(IncomingModel& incoming, const std::stop_token& stop) {
+  const auto tensors = incoming.finish();
+  {
+    const Lock lock(mutex_);
+    makeRoom({incoming.name(), 0}, incoming.manifest().tensors_bytes);
+  }
+  auto model = shellPgaFrom(incoming.manifest(), *tensors);
+  warm(*model);
+  {
+    const Lock lock(mutex_);
+    makeRoom({incoming.name(), 0}, model->bytes());
+  }
+  if (stop.stop_requested()) throw Stopped();
+  const auto version = directory_.publish(incoming);
+  return served({incoming.name(), static_cast<std::uint64_t>(version)}, incoming.manifest(), std::move(model));
+}
+
+ModelFiles ModelStore::files(const ModelSelector& selector) const {
+  Key key;
+  {
+    const Lock lock(mutex_);
+    key = resolve(selector);
+  }
+  return directory_.files(key.first, signedVersion(key.second));
 }
 
 std::uint64_t ModelStore::publishedBy(const std::string& name, const std::string& job_key) const {

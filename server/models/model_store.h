@@ -3,6 +3,7 @@
 #include <chrono>
 #include <map>
 #include <mutex>
+#include <stop_token>
 #include <string>
 #include <vector>
 
@@ -73,6 +74,14 @@ class ModelStore {
   /// Writes a new version, for which its name stands afterwards; it is in memory if the budget allows. Throws FileError
   /// when the disk fails: nothing is left behind.
   ServedModelPtr publish(const std::string& name, ShellPgaModelPtr model, const Provenance& provenance);
+  /// Takes in a version from elsewhere (ModelDirectory::receive). Throws OverBudget when it can never fit into memory.
+  std::unique_ptr<IncomingModel> receive(const std::string& name, std::string manifest_text) const;
+  /// Starts to verify, build and warm what has come, and then publishes it as publish() does. The load throws
+  /// InvalidInput when it is no model, OverBudget, FileError; Stopped when the token fires before it is published: in
+  /// each case nothing is left behind.
+  PendingModelPtr publish(std::unique_ptr<IncomingModel> incoming, std::stop_token stop);
+  /// The files of a version, without loading it. Throws ModelNotFound, InvalidInput as pin(); FileError.
+  ModelFiles files(const ModelSelector& selector) const;
   /// The version of a name that a job of this key has published; 0: none.
   std::uint64_t publishedBy(const std::string& name, const std::string& job_key) const;
   /// Removes one version, or all (0); returns the versions removed. Throws ModelNotFound; WrongState when a label
@@ -103,8 +112,11 @@ class ModelStore {
   Key resolve(const ModelSelector& selector) const;
   Key requireStored(Key key) const;
   PendingModelPtr startLoad(const Key& key);
+  void onLoader(std::function<void()> work);
   void runLoad(const Key& key, const PendingModelPtr& pending);
   ServedModelPtr read(const Key& key);
+  ServedModelPtr takeIn(IncomingModel& incoming, const std::stop_token& stop);
+  ServedModelPtr served(const Key& key, ModelManifest manifest, ShellPgaModelPtr model);
   void swapIn(const Key& key, const ServedModelPtr& model);
   void settle(const Key& key, Failure failure);
   void keep(const Key& key, ServedModelPtr model);

@@ -20,7 +20,8 @@ class StreamHandler {
   /// A message; comes again after it threw Waiting. True when `response` was filled and is to be sent (streams that
   /// answer every message).
   virtual bool message(const Request& request, Response& response, Call& call) = 0;
-  /// The client has sent all; fills the one response of a stream that answers at the end.
+  /// The client has sent all; fills the one response of a stream that answers at the end. Comes again after it threw
+  /// Waiting.
   virtual void end(Response& response, Call& call) = 0;
 };
 
@@ -88,7 +89,7 @@ class IncomingStreamCall final : public Reactor,
         answer = handler_->message(request_, response(), call_);
       });
     } catch (const Waiting& waiting) {
-      return park(waiting);
+      return park(waiting, has_message);
     }
     const Lock lock(mutex_);
     if (state_ == State::kEnded) return;
@@ -97,21 +98,22 @@ class IncomingStreamCall final : public Reactor,
     answer ? write() : read();
   }
 
-  /// The message is handled again once what it waits for has come; only messages wait, never the end.
-  void park(const Waiting& waiting) {
+  /// The message, or the end, is handled again once what it waits for has come.
+  void park(const Waiting& waiting, bool has_message) {
     const Lock lock(mutex_);
     if (state_ == State::kEnded) return;
     if (call_.stopped()) return end(call_.stopStatus());
     state_ = State::kParked;
-    waiting.then([self = this->shared_from_this()] { self->resume(); });
+    waiting.then([self = this->shared_from_this(), has_message] { self->resume(has_message); });
   }
 
-  void resume() {
+  void resume(bool has_message) {
     const Lock lock(mutex_);
     if (state_ != State::kParked) return;
     state_ = State::kWorking;
     call_.queued();
-    pool_.proceed(call_.id(), messageBytes(true), [self = this->shared_from_this()] { self->work(true); });
+    pool_.proceed(call_.id(), messageBytes(has_message),
+                  [self = this->shared_from_this(), has_message] { self->work(has_message); });
   }
 
   void write() {

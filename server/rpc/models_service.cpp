@@ -4,6 +4,7 @@
 #include "server/convert/mesh.h"
 #include "server/convert/model.h"
 #include "server/rpc/answer.h"
+#include "server/rpc/model_transfer.h"
 #include "server/rpc/unary_call.h"
 
 namespace shaped::server {
@@ -95,6 +96,18 @@ grpc::ServerUnaryReactor* ModelsService::Delete(grpc::CallbackServerContext* con
         for (const auto version : store_.remove(wanted.model().name(), wanted.model().version()))
           setVersion(wanted.model().name(), version, *answer.add_deleted());
       });
+}
+
+grpc::ServerWriteReactor<v1::DownloadModelResponse>* ModelsService::Download(grpc::CallbackServerContext* context,
+                                                                             const v1::DownloadModelRequest* request) {
+  return startOutgoing<v1::DownloadModelRequest, v1::DownloadModelResponse>(
+      runtime_, runtime_.light, "Models.Download", context, request, sendModel(store_, limits_));
+}
+
+grpc::ServerReadReactor<v1::UploadModelRequest>* ModelsService::Upload(grpc::CallbackServerContext* context,
+                                                                       v1::UploadModelResponse* response) {
+  return startClientStream<v1::UploadModelRequest, v1::UploadModelResponse>(
+      runtime_, runtime_.light, "Models.Upload", context, response, receiveModel(store_, limits_));
 }
 
 }  // namespace shaped::server

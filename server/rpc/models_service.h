@@ -1,5 +1,6 @@
 #pragma once
 
+#include "server/convert/limits.h"
 #include "server/models/model_store.h"
 #include "server/rpc/call.h"
 #include "shaped/v1/models.grpc.pb.h"
@@ -8,7 +9,8 @@ namespace shaped::server {
 
 class ModelsService final : public v1::Models::CallbackService {
  public:
-  ModelsService(Runtime& runtime, ModelStore& store) : runtime_(runtime), store_(store) {}
+  ModelsService(Runtime& runtime, const Limits& limits, ModelStore& store)
+      : runtime_(runtime), limits_(limits), store_(store) {}
 
   grpc::ServerUnaryReactor* List(grpc::CallbackServerContext* context, const v1::ListModelsRequest* request,
                                  v1::ListModelsResponse* response) override;
@@ -25,9 +27,14 @@ class ModelsService final : public v1::Models::CallbackService {
                                      v1::SetLabelResponse* response) override;
   grpc::ServerUnaryReactor* Delete(grpc::CallbackServerContext* context, const v1::DeleteModelRequest* request,
                                    v1::DeleteModelResponse* response) override;
+  grpc::ServerWriteReactor<v1::DownloadModelResponse>* Download(grpc::CallbackServerContext* context,
+                                                                const v1::DownloadModelRequest* request) override;
+  grpc::ServerReadReactor<v1::UploadModelRequest>* Upload(grpc::CallbackServerContext* context,
+                                                          v1::UploadModelResponse* response) override;
 
  private:
   Runtime& runtime_;
+  const Limits& limits_;
   ModelStore& store_;
 };
 

@@ -23,6 +23,9 @@ const std::map<std::string_view, Role>& methods() {
       {"/shaped.v1.Models/SetLabel", Role::kAdmin},
       {"/shaped.v1.Models/WaitUntilReady", Role::kRead},
       {"/shaped.v1.Models/Delete", Role::kAdmin},
+      // Who may have answers from a model may have the model; who only watches the daemon may not.
+      {"/shaped.v1.Models/Download", Role::kInfer},
+      {"/shaped.v1.Models/Upload", Role::kAdmin},
       {"/shaped.v1.Datasets/List", Role::kRead},
       {"/shaped.v1.Datasets/Upload", Role::kTrain},
       {"/shaped.v1.Datasets/Delete", Role::kTrain},

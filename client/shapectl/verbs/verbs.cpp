@@ -4,14 +4,14 @@ namespace shaped::shapectl {
 
 std::vector<Verb> allVerbs() {
   return {
-      trainVerb(),                                                     //
-      modelsVerb(),  describeVerb(),   deleteVerb(),                   //
-      loadVerb(),    unloadVerb(),     labelVerb(),       waitVerb(),  //
+      trainVerb(),                                                                        //
+      modelsVerb(),  describeVerb(),   deleteVerb(),                                      //
+      loadVerb(),    unloadVerb(),     labelVerb(),       waitVerb(),                     //
       jobsVerb(),    watchVerb(),      resultVerb(),      cancelVerb(), deleteJobVerb(),  //
-      projectVerb(), synthesizeVerb(), interpolateVerb(), editVerb(),  //
-      fitVerb(),     scoreVerb(),      evaluateVerb(),                 //
-      sampleVerb(),  renderVerb(),     tokenVerb(),                    //
-      topVerb(),     healthVerb(),     benchVerb(),                   //
+      projectVerb(), synthesizeVerb(), interpolateVerb(), editVerb(),                     //
+      fitVerb(),     scoreVerb(),      evaluateVerb(),                                    //
+      sampleVerb(),  renderVerb(),     tokenVerb(),                                       //
+      topVerb(),     healthVerb(),     benchVerb(),                                       //
   };
 }
 

@@ -14,6 +14,8 @@ Verb labelVerb();
 Verb waitVerb();
 Verb describeVerb();
 Verb deleteVerb();
+Verb downloadVerb();
+Verb uploadVerb();
 Verb deleteJobVerb();
 Verb jobsVerb();
 Verb watchVerb();

@@ -7,6 +7,7 @@
 
 #include "core/io/file.h"
 #include "core/io/file_error.h"
+#include "core/io/sha256.h"
 #include "server/convert/model.h"
 #include "server/errors/errors.h"
 #include "tests/support/models.h"
@@ -311,4 +312,88 @@ TEST_CASE("one can wait for a model that is still to come") {
   store.publish("m", test::tubeModel(), provenance);
   CHECK(woken == 1);
   CHECK(store.ready({"m", 0, ""})->version == 1);
+}
+
+namespace {
+
+/// The files of version 1 of "m", sent as "n" in pieces of `piece` bytes; `change` may spoil a piece.
+std::unique_ptr<IncomingModel> sent(ModelStore& store, std::size_t piece = 1000, std::size_t spoiled = SIZE_MAX) {
+  const auto files = store.files({"m", 1, ""});
+  auto incoming = store.receive("n", files.manifest_text);
+  for (std::size_t i = 0; i < files.tensors->bytes().size(); i += piece) {
+    std::string bytes(files.tensors->bytes().substr(i, piece));
+    if (i <= spoiled && spoiled < i + piece) bytes[spoiled - i] ^= 1;
+    incoming->append(bytes);
+  }
+  return incoming;
+}
+
+std::vector<std::string> entriesOf(const std::filesystem::path& folder) {
+  std::vector<std::string> names;
+  for (const auto& entry : std::filesystem::directory_iterator(folder)) names.push_back(entry.path().filename());
+  std::sort(names.begin(), names.end());
+  return names;
+}
+
+}  // namespace
+
+TEST_CASE("a model that is brought is published once it has been verified, to the bit") {
+  const test::TemporaryFolder folder;
+  publishVersions(folder.path(), 1);
+  ModelStore store(folder.path());
+  auto incoming = sent(store);
+  CHECK(store.list().size() == 1);
+  const auto served = store.publish(std::move(incoming), {})->wait();
+  CHECK(served->name == "n");
+  CHECK(served->version == 1);
+  CHECK(store.pin({"n", 0, ""}) == served);
+  for (const auto* file : {kManifestFile, kTensorsFile})
+    CHECK(readFile(folder.path() / "n/1" / file) == readFile(folder.path() / "m/1" / file));
+  CHECK(store.publish(sent(store), {})->wait()->version == 2);
+  CHECK(store.pin({"n", 0, ""})->version == 2);
+  CHECK(entriesOf(folder.path()) == std::vector<std::string>{"m", "n"});
+}
+
+TEST_CASE("nothing is left of a model that cannot be taken in") {
+  const test::TemporaryFolder folder;
+  publishVersions(folder.path(), 1);
+  ModelStore store(folder.path());
+  CHECK_THROWS_WITH(store.publish(sent(store, 1000, 2500), {})->wait(), Catch::Contains("tensors: have SHA-256"));
+  CHECK(entriesOf(folder.path()) == std::vector<std::string>{"m"});
+
+  std::stop_source stopped;
+  stopped.request_stop();
+  CHECK_THROWS_AS(store.publish(sent(store), stopped.get_token())->wait(), Stopped);
+  sent(store);  // and given up
+  CHECK(entriesOf(folder.path()) == std::vector<std::string>{"m"});
+
+  CHECK_THROWS_WITH(store.receive("../n", store.files({"m", 1, ""}).manifest_text), Catch::Contains("no name"));
+  CHECK_THROWS_AS(store.receive("n", "{}"), InvalidInput);
+  auto manifest = store.files({"m", 1, ""}).manifest;
+  manifest.kind = "oracle";
+  CHECK_THROWS_WITH(store.receive("n", textOf(manifest)), Catch::Contains("is of kind \"oracle\""));
+  CHECK(entriesOf(folder.path()) == std::vector<std::string>{"m"});
+}
+
+TEST_CASE("a model that is larger than the budget is not taken in") {
+  const test::TemporaryFolder folder;
+  publishVersions(folder.path(), 1);
+  const auto manifest = ModelStore(folder.path()).files({"m", 1, ""}).manifest_text;
+  ModelStore store(folder.path(), {.memory_budget = 1000, .loaders = 1});
+  CHECK_THROWS_AS(store.receive("n", manifest), OverBudget);
+}
+
+TEST_CASE("a label's version is handed on, whatever becomes of it meanwhile") {
+  const test::TemporaryFolder folder;
+  publishVersions(folder.path(), 2);
+  ModelStore store(folder.path());
+  store.setLabel("m", "stable", 1);
+  const auto files = store.files({"m", 0, ""});
+  CHECK(files.version == 1);
+  CHECK(store.files({"m", 2, ""}).version == 2);
+  CHECK_THROWS_AS(store.files({"m", 3, ""}), ModelNotFound);
+  const auto before = sha256(files.tensors->bytes());
+  store.remove("m", 0);
+  CHECK(sha256(files.tensors->bytes()) == before);
+  CHECK(before == files.manifest.tensors_sha256);
 }

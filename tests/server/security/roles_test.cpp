@@ -41,6 +41,8 @@ TEST_CASE("every method of every service has its role") {
 TEST_CASE("the roles of methods") {
   CHECK(requirementOf("/shaped.v1.Models/Get").role == Role::kRead);
   CHECK(requirementOf("/shaped.v1.Models/Delete").role == Role::kAdmin);
+  CHECK(requirementOf("/shaped.v1.Models/Download").role == Role::kInfer);
+  CHECK(requirementOf("/shaped.v1.Models/Upload").role == Role::kAdmin);
   CHECK(requirementOf("/shaped.v1.Datasets/Upload").role == Role::kTrain);
   CHECK(requirementOf("/shaped.v1.Jobs/Watch").role == Role::kRead);
   CHECK(requirementOf("/shaped.v1.Jobs/Cancel").role == Role::kTrain);
