@@ -89,8 +89,22 @@ Daemon::Daemon(const DaemonOptions& options)
   for (auto* pool : {&pool_, &light_, &results_}) pool->setAgeing(options.ageing);
   if (!options.metrics.empty())
     scrape_ = std::make_unique<HttpListener>("--metrics", options.metrics, scrapeHandler(metrics_, ready_));
+  if (options.watch_models) watch_ = std::make_unique<ModelWatch>(models_, options.store / "models");
   listen(options.listen);
-  ready_ = true;
+  preload_ =
+      std::make_unique<Preload>(models_, preloadListFrom("--preload", options.preload), [this] { becomeReady(); });
+}
+
+/// Others may be asked for while models are still on their way; what failed to load keeps nobody from the rest.
+void Daemon::becomeReady() {
+  const std::scoped_lock lock(readiness_);
+  if (!stopping_) setServing(true);
+}
+
+/// Call with readiness_ held.
+void Daemon::setServing(bool serving) {
+  ready_ = serving;
+  if (auto* health = server_ ? server_->GetHealthCheckService() : nullptr) health->SetServingStatus(serving);
 }
 
 Surroundings Daemon::surroundings() {
@@ -120,6 +134,7 @@ void Daemon::listen(const std::string& address) {
   const bool by_port = !address.starts_with("unix:");
   if (!server_ || (by_port && port <= 0))
     throw InvalidInput("--listen", "cannot serve on " + address + "; is the address taken, or not of this machine?");
+  server_->GetHealthCheckService()->SetServingStatus(false);  // until becomeReady()
   address_ = by_port ? address.substr(0, address.rfind(':')) + ":" + std::to_string(port) : address;
 }
 
@@ -149,13 +164,16 @@ void Daemon::useLimits() {
 }
 
 void Daemon::announceStop() {
-  ready_ = false;
-  if (auto* health = server_ ? server_->GetHealthCheckService() : nullptr) health->SetServingStatus(false);
+  const std::scoped_lock lock(readiness_);
+  stopping_ = true;
+  setServing(false);
 }
 
 void Daemon::shutdown(std::chrono::duration<double> grace) {
   if (!server_) return;
   announceStop();
+  preload_.reset();
+  watch_.reset();
   jobs_.leave();
   jobs_service_.stopWatching();
   server_->Shutdown(std::chrono::system_clock::now() +

@@ -4,8 +4,11 @@
 
 #include <atomic>
 #include <memory>
+#include <mutex>
 
+#include "server/daemon/model_watch.h"
 #include "server/daemon/options.h"
+#include "server/daemon/preload.h"
 #include "server/daemon/store_lock.h"
 #include "server/datasets/dataset_store.h"
 #include "server/jobs/job_runner.h"
@@ -52,6 +55,8 @@ class Daemon {
  private:
   void listen(const std::string& address);
   void useLimits();
+  void setServing(bool serving);
+  void becomeReady();
   Surroundings surroundings();
 
   DaemonOptions options_;
@@ -75,7 +80,11 @@ class Daemon {
   std::string address_;
   std::atomic<bool> ready_{false};
   std::unique_ptr<grpc::Server> server_;
-  std::unique_ptr<HttpListener> scrape_;  // last: its thread asks for all of the above
+  std::mutex readiness_;  ///< ready_, stopping_ and what health says change together
+  bool stopping_ = false;
+  std::unique_ptr<HttpListener> scrape_;  // last: their threads ask for all of the above
+  std::unique_ptr<ModelWatch> watch_;
+  std::unique_ptr<Preload> preload_;
 };
 
 }  // namespace shaped::server

@@ -4,10 +4,13 @@
 
 #include "core/io/text_scanner.h"
 #include "core/numerics/error.h"
+#include "server/daemon/preload.h"
 #include "server/telemetry/call_log.h"
 
 namespace shaped::server {
 namespace {
+
+constexpr const char *kExplicit = "explicit", *kWatch = "watch";
 
 enum class When { kAtStart, kWhileRunning };
 
@@ -80,6 +83,30 @@ OptionSpec listenInsecurelyOption() {
             if (!value.empty()) options.listen = value;
           },
           [](const DaemonOptions& options) { return options.security.anywhere ? options.listen : std::string(); }};
+}
+
+OptionSpec preloadOption() {
+  auto option = textOption(
+      "preload", "NAME,...", When::kAtStart, [](auto& o) -> auto& { return o.preload; },
+      "models to have in memory before health says SERVING: NAME, NAME@VERSION, NAME@LABEL, or all");
+  option.set = [](DaemonOptions& options, const std::string& where, const std::string& value) {
+    preloadListFrom(where, value);
+    options.preload = value;
+  };
+  return option;
+}
+
+OptionSpec modelPolicyOption() {
+  return {"model-policy",
+          "POLICY",
+          "explicit: versions that others put into the store count once they are loaded; watch: as they appear",
+          false,
+          [](DaemonOptions& options, const std::string& where, const std::string& value) {
+            if (value != kExplicit && value != kWatch)
+              throw InvalidInput(where, "\"" + value + "\", want " + kExplicit + " or " + kWatch);
+            options.watch_models = value == kWatch;
+          },
+          [](const DaemonOptions& options) { return std::string(options.watch_models ? kWatch : kExplicit); }};
 }
 
 OptionSpec logFormatOption() {
@@ -186,6 +213,8 @@ std::vector<OptionSpec> limitOptions() {
       countOption(
           "model-megabytes", "N", When::kAtStart, kMostCount, [](auto& o) -> auto& { return o.models.memory_budget; },
           "memory for models; those that no request holds are dropped at need [MiB]", 1 << 20),
+      preloadOption(),
+      modelPolicyOption(),
       countOption(
           "max-vertices", "N", When::kAtStart, kMostVertices, [](auto& o) -> auto& { return o.limits.vertices; },
           "largest mesh that is taken"),

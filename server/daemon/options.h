@@ -31,6 +31,8 @@ struct DaemonOptions {
   SecurityOptions security;
   Limits limits;  ///< of requests
   ModelStoreOptions models;
+  std::string preload;              ///< as preloadListFrom takes it; empty: none
+  bool watch_models = false;        ///< take over what other processes change in the store
   std::string log = "info";         ///< debug, info, warn, error
   std::string log_format = "text";  ///< text, json
   std::string metrics;              ///< host:port of the scrape's HTTP; empty: none

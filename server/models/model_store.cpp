@@ -11,14 +11,23 @@
 namespace shaped::server {
 namespace {
 
-constexpr const char* kStable = "stable";
 constexpr std::chrono::seconds kRetryDelay(1);
 
 using Lock = std::scoped_lock<std::mutex>;
 
 std::int64_t signedVersion(std::uint64_t version) { return static_cast<std::int64_t>(version); }
 
+std::vector<std::uint64_t> unsignedVersions(const std::vector<std::int64_t>& versions) {
+  return {versions.begin(), versions.end()};
+}
+
 std::string megabytes(std::size_t bytes) { return std::to_string((bytes + (1 << 20) - 1) >> 20) + " MiB"; }
+
+PendingModelPtr ended(ServedModelPtr model) {
+  auto pending = std::make_shared<PendingModel>();
+  pending->finish(std::move(model), nullptr);
+  return pending;
+}
 
 /// version: 0 for one that has no number yet.
 OverBudget overBudget(const std::string& name, std::uint64_t version, std::size_t bytes, std::size_t budget) {
@@ -30,46 +39,42 @@ OverBudget overBudget(const std::string& name, std::uint64_t version, std::size_
 
 }  // namespace
 
+/// Keeps look() from a version that is being published here, which would be loaded a second time.
+class ModelStore::Publishing {
+ public:
+  Publishing(ModelStore& store, const std::string& name) : store_(store) {
+    const Lock lock(store_.mutex_);
+    place_ = store_.publishing_.insert(name);
+  }
+  ~Publishing() {
+    {
+      const Lock lock(store_.mutex_);
+      store_.publishing_.erase(place_);
+    }
+    store_.published_.notify_all();
+  }
+  Publishing(const Publishing&) = delete;
+  Publishing& operator=(const Publishing&) = delete;
+
+ private:
+  ModelStore& store_;
+  std::multiset<std::string>::iterator place_;
+};
+
 ModelStore::ModelStore(const std::filesystem::path& root, const ModelStoreOptions& options)
     : directory_(root), options_(options), loaders_(options.loaders, noLimits(), {}) {
   for (const auto& name : directory_.models()) {
-    newest_[name] = static_cast<std::uint64_t>(directory_.versions(name).back());
+    table_.add({name, unsignedVersions(directory_.versions(name)).back()});
     for (const auto& [label, version] : directory_.labels(name))
-      labels_[name][label] = static_cast<std::uint64_t>(version);
+      table_.setLabel(name, label, static_cast<std::uint64_t>(version));
   }
-}
-
-/// 0: none. Call with the mutex held.
-std::uint64_t ModelStore::servingVersion(const std::string& name) const {
-  if (const auto labels = labels_.find(name); labels != labels_.end())
-    if (const auto stable = labels->second.find(kStable); stable != labels->second.end()) return stable->second;
-  const auto newest = newest_.find(name);
-  return newest == newest_.end() ? 0 : newest->second;
 }
 
 /// Call with the mutex held.
 ModelStore::Key ModelStore::resolve(const ModelSelector& selector) const {
-  const auto& [name, version, label] = selector;
-  if (version != 0 && !label.empty()) throw InvalidInput("model.label", "stands beside a version; name one of them");
-  if (version != 0) return {name, version};
-  if (label.empty()) {
-    directory_.versions(name);  // throws for a bad name
-    if (const auto serving = servingVersion(name)) return {name, serving};
-    throw ModelNotFound("model", "there is no model \"" + name + "\"");
-  }
-  const auto labels = labels_.find(name);
-  if (labels == labels_.end() || !labels->second.contains(label))
-    throw ModelNotFound("model.label", "no version of \"" + name + "\" is labelled \"" + label + "\"");
-  return {name, labels->second.at(label)};
-}
-
-/// Call with the mutex held.
-std::vector<std::string> ModelStore::labelsOf(const Key& key) const {
-  std::vector<std::string> names;
-  if (const auto labels = labels_.find(key.first); labels != labels_.end())
-    for (const auto& [label, version] : labels->second)
-      if (version == key.second) names.push_back(label);
-  return names;
+  if (const auto key = table_.resolve(selector)) return *key;
+  directory_.versions(selector.name);  // throws for a bad name
+  throw ModelNotFound("model", "there is no model \"" + selector.name + "\"");
 }
 
 /// The key, version 0 replaced by the newest on the disk. Throws ModelNotFound.
@@ -84,26 +89,48 @@ ModelStore::Key ModelStore::requireStored(Key key) const {
 }
 
 ServedModelPtr ModelStore::pin(const ModelSelector& selector) {
-  PendingModelPtr pending;
+  std::optional<Key> key;
   {
     const Lock lock(mutex_);
-    const auto key = resolve(selector);
-    if (const auto slot = slots_.find(key); slot != slots_.end() && slot->second.model) {
-      slot->second.last_used = ++uses_;
-      return slot->second.model;
-    }
-    requireStored(key);
-    const auto& failure = slots_[key].failure;
-    const bool fails_again = failure.load && std::chrono::steady_clock::now() < failure.until &&
-                             failure.files == directory_.fingerprint(key.first, signedVersion(key.second));
-    pending = fails_again ? failure.load : startLoad(key);
+    key = resolve(selector);
+    if (auto model = inMemory(*key)) return model;
   }
-  return pending->get();
+  return startWanted(*key)->get();
+}
+
+PendingModelPtr ModelStore::fetch(const ModelSelector& selector) {
+  std::optional<Key> key;
+  {
+    const Lock lock(mutex_);
+    key = resolve(selector);
+    if (auto model = inMemory(*key)) return ended(std::move(model));
+  }
+  return startWanted(*key);
+}
+
+/// Call with the mutex held.
+ServedModelPtr ModelStore::inMemory(const Key& key) {
+  const auto slot = slots_.find(key);
+  if (slot == slots_.end() || !slot->second.model) return nullptr;
+  slot->second.last_used = ++uses_;
+  return slot->second.model;
+}
+
+/// Looks into the folder without the mutex: a disk that hangs holds up who wants this model, and nobody else.
+PendingModelPtr ModelStore::startWanted(const Key& key) {
+  requireStored(key);
+  const auto files = directory_.fingerprint(key.first, signedVersion(key.second));
+  const Lock lock(mutex_);
+  if (auto model = inMemory(key)) return ended(std::move(model));  // it has come meanwhile
+  const auto& failure = slots_[key].failure;
+  const bool fails_again = failure.load && std::chrono::steady_clock::now() < failure.until && failure.files == files;
+  return fails_again ? failure.load : startLoad(key);
 }
 
 PendingModelPtr ModelStore::load(const std::string& name, std::uint64_t version) {
+  const auto key = requireStored({name, version});
   const Lock lock(mutex_);
-  return startLoad(requireStored({name, version}));
+  return startLoad(key);
 }
 
 /// Joins a load that runs. Call with the mutex held.
@@ -128,16 +155,16 @@ void ModelStore::runLoad(const Key& key, const PendingModelPtr& pending) {
   auto files = directory_.fingerprint(key.first, signedVersion(key.second));
   ServedModelPtr model;
   std::exception_ptr failure;
-  // Other failures may pass, so they are tried again: not by those who waited for this one, but after a while.
-  auto until = std::chrono::steady_clock::now() + kRetryDelay;
+  auto until = std::chrono::steady_clock::time_point::max();  // or until the files change
   try {
     model = read(key);
     swapIn(key, model);
   } catch (const FileError&) {
     failure = std::current_exception();
-    until = std::chrono::steady_clock::time_point::max();  // or until the files change
   } catch (...) {
     failure = std::current_exception();
+    // What may pass is tried again: not by those who waited for this load, but after a while.
+    until = std::chrono::steady_clock::now() + kRetryDelay;
   }
   settle(key, {failure ? pending : nullptr, std::move(files), until});
   pending->finish(failure ? nullptr : model, failure);
@@ -178,16 +205,15 @@ void ModelStore::settle(const Key& key, Failure failure) {
 /// Keeps a model in memory and lets its name stand for it; drops the version it replaces unless a label stands for
 /// that. Call with the mutex held.
 void ModelStore::keep(const Key& key, ServedModelPtr model) {
-  const auto& [name, version] = key;
-  const Key before{name, servingVersion(name)};
-  auto& newest = newest_[name];
-  newest = std::max(newest, version);
+  const auto& name = key.first;
+  const Key before{name, table_.serving(name)};
+  table_.add(key);
   auto& slot = slots_[key];
   slot.model = std::move(model);
   slot.last_used = ++uses_;
-  if (before.second == 0 || before.second == servingVersion(name)) return;
+  if (before.second == 0 || before.second == table_.serving(name)) return;
   const auto old = slots_.find(before);
-  if (old != slots_.end() && !old->second.pending && labelsOf(before).empty()) slots_.erase(old);
+  if (old != slots_.end() && !old->second.pending && table_.labelsOf(before).empty()) slots_.erase(old);
 }
 
 /// Makes room for a version that is about to be loaded; the one it replaces must not go before it is there. Call with
@@ -208,9 +234,9 @@ void ModelStore::makeRoom(const Key& wanted, std::size_t bytes) {
 
 std::vector<std::uint64_t> ModelStore::unload(const std::string& name, std::uint64_t version) {
   std::vector<std::uint64_t> dropped;
+  requireStored({name, version});
   {
     const Lock lock(mutex_);
-    requireStored({name, version});
     std::erase_if(slots_, [&](const auto& item) {
       const auto& [key, slot] = item;
       const bool meant = key.first == name && (version == 0 || key.second == version) && slot.model;
@@ -251,7 +277,7 @@ void ModelStore::changed() {
 
 ModelStore::Standing ModelStore::standing(const std::string& name, std::uint64_t version) const {
   const Lock lock(mutex_);
-  return {labelsOf({name, version}), servingVersion(name) == version};
+  return {table_.labelsOf({name, version}), table_.serving(name) == version};
 }
 
 std::vector<ModelStore::Entry> ModelStore::list() const {
@@ -264,7 +290,7 @@ std::vector<ModelStore::Entry> ModelStore::list() const {
       }
   const Lock lock(mutex_);
   for (auto& entry : entries) {
-    entry.standing = {labelsOf({entry.name, entry.version}), servingVersion(entry.name) == entry.version};
+    entry.standing = {table_.labelsOf({entry.name, entry.version}), table_.serving(entry.name) == entry.version};
     const auto found = slots_.find({entry.name, entry.version});
     if (found == slots_.end()) continue;
     const auto& slot = found->second;
@@ -286,6 +312,7 @@ std::vector<ServedModelPtr> ModelStore::loaded() const {
 }
 
 ServedModelPtr ModelStore::publish(const std::string& name, ShellPgaModelPtr model, const Provenance& provenance) {
+  const Publishing publishing(*this, name);
   const auto version = publishShellPga(directory_, name, *model, toJson(provenance));
   return served({name, static_cast<std::uint64_t>(version)}, directory_.manifest(name, version), std::move(model));
 }
@@ -302,7 +329,7 @@ ServedModelPtr ModelStore::served(const Key& key, ModelManifest manifest, ShellP
       makeRoom(key, bytes);
       keep(key, served);
     } catch (const OverBudget&) {  // it is published all the same, and loaded when wanted
-      newest_[name] = std::max(newest_[name], version);
+      table_.add(key);
     }
   }
   changed();
@@ -348,6 +375,7 @@ ServedModelPtr ModelStore::takeIn(IncomingModel& incoming, const std::stop_token
     makeRoom({incoming.name(), 0}, model->bytes());
   }
   if (stop.stop_requested()) throw Stopped();
+  const Publishing publishing(*this, incoming.name());
   const auto version = directory_.publish(incoming);
   return served({incoming.name(), static_cast<std::uint64_t>(version)}, incoming.manifest(), std::move(model));
 }
@@ -375,31 +403,77 @@ std::vector<std::uint64_t> ModelStore::remove(const std::string& name, std::uint
   std::vector<std::uint64_t> removed;
   const Lock lock(mutex_);
   if (version != 0) {
-    if (const auto labels = labelsOf({name, version}); !labels.empty())
+    if (const auto labels = table_.labelsOf({name, version}); !labels.empty())
       throw WrongState("version " + std::to_string(version) + " of \"" + name + "\" is labelled \"" + labels.front() +
                        "\"; move the label first, or delete the whole model");
     directory_.remove(name, signedVersion(version));
     removed.push_back(version);
   } else {
-    for (const auto each : directory_.versions(name)) removed.push_back(static_cast<std::uint64_t>(each));
+    removed = unsignedVersions(directory_.versions(name));
     directory_.remove(name);
-    labels_.erase(name);
   }
-  for (const auto each : removed) slots_.erase({name, each});
-  if (const auto left = directory_.versions(name); left.empty())
-    newest_.erase(name);
-  else if (newest_[name] == version)
-    newest_[name] = static_cast<std::uint64_t>(left.back());
+  const auto left = unsignedVersions(directory_.versions(name));
+  dropMissing(name, left);
+  // Of what another process put there, the newest: something must be left for the name to stand for.
+  if (table_.newest(name) == 0 && !left.empty()) table_.add({name, left.back()});
   return removed;
 }
 
 void ModelStore::setLabel(const std::string& name, const std::string& label, std::uint64_t version) {
   const Lock lock(mutex_);
   directory_.setLabel(name, label, signedVersion(version));
-  if (version == 0)
-    labels_[name].erase(label);
-  else
-    labels_[name][label] = version;
+  table_.setLabel(name, label, version);
+}
+
+/// Forgets what is not among the versions left of a name; returns what was in memory or the newest known. Call with the
+/// mutex held.
+std::vector<std::uint64_t> ModelStore::dropMissing(const std::string& name, const std::vector<std::uint64_t>& left) {
+  const auto missing = [&](std::uint64_t version) {
+    return version != 0 && !std::binary_search(left.begin(), left.end(), version);
+  };
+  std::set<std::uint64_t> gone;
+  if (const auto newest = table_.newest(name); missing(newest)) gone.insert(newest);
+  std::erase_if(slots_, [&](const auto& item) {
+    const auto& [key, slot] = item;
+    const bool meant = key.first == name && missing(key.second);
+    if (meant && slot.model) gone.insert(key.second);
+    return meant;
+  });
+  table_.keepOnly(name, left);
+  return {gone.begin(), gone.end()};
+}
+
+/// Whether a version's files are there, as long as they should be. Publishing by rename makes it so in one step.
+bool ModelStore::whole(const Key& key) const try {
+  directory_.files(key.first, signedVersion(key.second));
+  return true;
+} catch (const std::exception&) {
+  return false;
+}
+
+ModelStore::Changes ModelStore::look(const std::string& name) {
+  Changes changes;
+  std::vector<std::uint64_t> candidates;
+  {
+    std::unique_lock lock(mutex_);
+    published_.wait(lock, [&] { return !publishing_.contains(name); });
+    const auto versions = unsignedVersions(directory_.versions(name));
+    changes.gone = dropMissing(name, versions);
+    candidates.assign(std::upper_bound(versions.begin(), versions.end(), table_.newest(name)), versions.end());
+  }
+  for (auto version = candidates.rbegin(); version != candidates.rend(); ++version) {
+    const Key key{name, *version};
+    if (!whole(key)) continue;
+    const auto files = directory_.fingerprint(name, signedVersion(*version));
+    const Lock lock(mutex_);
+    const auto& failure = slots_[key].failure;
+    if (failure.load && failure.files == files) continue;
+    changes.appeared = *version;
+    changes.load = startLoad(key);
+    break;
+  }
+  if (!changes.gone.empty()) changed();
+  return changes;
 }
 
 }  // namespace shaped::server

@@ -1,13 +1,16 @@
 #pragma once
 
 #include <chrono>
+#include <condition_variable>
 #include <map>
 #include <mutex>
+#include <set>
 #include <stop_token>
 #include <string>
 #include <vector>
 
 #include "server/models/pending_model.h"
+#include "server/models/version_table.h"
 #include "server/scheduling/worker_pool.h"
 
 namespace shaped::server {
@@ -32,7 +35,7 @@ struct ModelStoreOptions {
 ///
 /// Without a version or label a name stands for its "stable" version, where that label is set, else for the newest
 /// version known: at start the newest on the disk, then what was published or loaded here. What another process puts
-/// into the store counts once it is loaded.
+/// into the store counts once it is loaded, by load() or because look() was called.
 class ModelStore {
  public:
   explicit ModelStore(const std::filesystem::path& root, const ModelStoreOptions& options = {});
@@ -41,6 +44,8 @@ class ModelStore {
   /// Throws ModelNotFound; InvalidInput for a bad name or a selector with version and label; what its load threw:
   /// FileError when files are damaged, at once until they change, OverBudget when it does not fit into memory.
   ServedModelPtr pin(const ModelSelector& selector);
+  /// As pin(), but gives the load to wait for; one that has ended when the model is in memory.
+  PendingModelPtr fetch(const ModelSelector& selector);
   /// Starts to load a version from the disk, whether or not it is in memory; 0: the newest on the disk. Its name stands
   /// for it afterwards unless it stood for a newer one. Throws ModelNotFound, InvalidInput for a bad name.
   PendingModelPtr load(const std::string& name, std::uint64_t version);
@@ -82,6 +87,18 @@ class ModelStore {
   PendingModelPtr publish(std::unique_ptr<IncomingModel> incoming, std::stop_token stop);
   /// The files of a version, without loading it. Throws ModelNotFound, InvalidInput as pin(); FileError.
   ModelFiles files(const ModelSelector& selector) const;
+  /// What another process changed in a model's folder.
+  struct Changes {
+    std::vector<std::uint64_t> gone;  ///< that were in memory or the newest known
+    std::uint64_t appeared = 0;       ///< newer than the newest known; 0: none
+    PendingModelPtr load;             ///< its load, begun; null where none has appeared
+  };
+  /// Looks at a model's folder: drops what has gone, and starts to load the newest whole version if it is newer than
+  /// the one known. Versions that failed are passed over until their files change; those that are not whole, too. Waits
+  /// while a version of the name is being published here.
+  Changes look(const std::string& name);
+  /// Of the models in the store, sorted.
+  std::vector<std::string> names() const { return directory_.models(); }
   /// The version of a name that a job of this key has published; 0: none.
   std::uint64_t publishedBy(const std::string& name, const std::string& job_key) const;
   /// Removes one version, or all (0); returns the versions removed. Throws ModelNotFound; WrongState when a label
@@ -92,7 +109,8 @@ class ModelStore {
   void setLabel(const std::string& name, const std::string& label, std::uint64_t version);
 
  private:
-  using Key = std::pair<std::string, std::uint64_t>;
+  using Key = ModelKey;
+  class Publishing;
   /// How the last load ended, when it failed: who asks again before the files change or the time is up fails alike.
   struct Failure {
     PendingModelPtr load;
@@ -105,14 +123,15 @@ class ModelStore {
     Failure failure;
     std::uint64_t last_used = 0;
   };
-  using Labels = std::map<std::string, std::uint64_t>;
 
-  std::uint64_t servingVersion(const std::string& name) const;
-  std::vector<std::string> labelsOf(const Key& key) const;
   Key resolve(const ModelSelector& selector) const;
   Key requireStored(Key key) const;
   PendingModelPtr startLoad(const Key& key);
   void onLoader(std::function<void()> work);
+  std::vector<std::uint64_t> dropMissing(const std::string& name, const std::vector<std::uint64_t>& left);
+  ServedModelPtr inMemory(const Key& key);
+  PendingModelPtr startWanted(const Key& key);
+  bool whole(const Key& key) const;
   void runLoad(const Key& key, const PendingModelPtr& pending);
   ServedModelPtr read(const Key& key);
   ServedModelPtr takeIn(IncomingModel& incoming, const std::stop_token& stop);
@@ -127,8 +146,9 @@ class ModelStore {
   const ModelStoreOptions options_;
   mutable std::mutex mutex_;
   std::map<Key, Slot> slots_;
-  std::map<std::string, std::uint64_t> newest_;  ///< by name: the newest version known
-  std::map<std::string, Labels> labels_;
+  VersionTable table_;
+  std::multiset<std::string> publishing_;  ///< names that get a version here at the moment
+  std::condition_variable published_;
   std::vector<Waiting::Resume> watchers_;  ///< of ready()
   std::uint64_t uses_ = 0, loads_ = 0, changes_ = 0;
   WorkerPool loaders_;  // last: its threads use what stands above

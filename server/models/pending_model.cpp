@@ -7,12 +7,12 @@ namespace shaped::server {
 ServedModelPtr PendingModel::get() {
   const std::scoped_lock lock(mutex_);
   if (done_) return result();
-  throw Waiting([self = shared_from_this()](Waiting::Resume resume) { self->subscribe(std::move(resume)); });
+  throw Waiting([self = shared_from_this()](Waiting::Resume resume) { self->whenDone(std::move(resume)); });
 }
 
 ServedModelPtr PendingModel::wait() {
   std::promise<void> done;
-  subscribe([&done] { done.set_value(); });
+  whenDone([&done] { done.set_value(); });
   done.get_future().wait();
   const std::scoped_lock lock(mutex_);
   return result();
@@ -30,7 +30,7 @@ void PendingModel::finish(ServedModelPtr model, std::exception_ptr failure) {
   for (const auto& resume : waiting) resume();
 }
 
-void PendingModel::subscribe(Waiting::Resume resume) {
+void PendingModel::whenDone(Waiting::Resume resume) {
   {
     const std::scoped_lock lock(mutex_);
     if (!done_) return waiting_.push_back(std::move(resume));

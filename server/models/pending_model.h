@@ -17,11 +17,13 @@ class PendingModel : public std::enable_shared_from_this<PendingModel> {
   /// As get(), but waits in this thread.
   ServedModelPtr wait();
 
+  /// Calls once it has ended, from any thread, perhaps at once.
+  void whenDone(Waiting::Resume resume);
+
   /// Ends it, once, with a model or a failure; resumes who waits.
   void finish(ServedModelPtr model, std::exception_ptr failure);
 
  private:
-  void subscribe(Waiting::Resume resume);
   ServedModelPtr result() const;
 
   std::mutex mutex_;

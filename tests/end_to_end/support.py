@@ -1,5 +1,6 @@
 """A daemon, a client and small meshes for the end-to-end tests."""
 
+import hashlib
 import json
 import os
 import pathlib
@@ -186,3 +187,43 @@ def generate_messages(folder):
     """Python's modules of all messages, as docs/api.md makes them."""
     subprocess.run(["protoc", f"--python_out={folder}", "-I", SOURCE / "proto", *sorted((SOURCE / "proto/shaped/v1").glob("*.proto")),
                     *sorted((SOURCE / "proto/google/rpc").glob("*.proto"))], check=True)
+
+
+def many_modes(source, target, modes):
+    """A version like `source` with more modes: the first variations over and over, a little apart. Loads slowly."""
+    manifest = json.loads((source / "manifest.json").read_text())
+    data = (source / "tensors.safetensors").read_bytes()
+    length = int.from_bytes(data[:8], "little")
+    header = json.loads(data[8:8 + length])
+    types = {"F64": numpy.float64, "F32": numpy.float32, "I64": numpy.int64, "I32": numpy.int32}
+    tensors = {name: numpy.frombuffer(data[8 + length:][slice(*entry["data_offsets"])], types[entry["dtype"]])
+               .reshape(entry["shape"]) for name, entry in header.items()}
+    vertices = tensors["mean"].shape[0]
+    variation = tensors["variations"].reshape(-1, vertices, 3)[0]
+    scale = 1 + 1e-3 * numpy.linspace(0, 1, 2 * modes)
+    tensors["variations"] = (scale[:, None, None] * variation).reshape(-1, 3)
+    tensors["eigenvalues"] = numpy.linspace(1, 0.5, modes) * tensors["eigenvalues"][0]
+    tensors["eigenvectors"] = numpy.eye(modes)
+    manifest["description"]["modes"] = modes
+    write_tensors(target, manifest, tensors)
+
+
+def write_tensors(folder, manifest, tensors):
+    """A version's two files; the manifest is given without its statement of the tensors."""
+    types = {"float64": "F64", "float32": "F32", "int64": "I64", "int32": "I32"}
+    ordered = sorted(tensors.items(), key=lambda item: -item[1].itemsize)
+    header, end = {}, 0
+    for name, numbers in ordered:
+        header[name] = {"dtype": types[str(numbers.dtype)], "shape": list(numbers.shape), "data_offsets": [end, end + numbers.nbytes]}
+        end += numbers.nbytes
+    text = json.dumps(header).encode()
+    text += b" " * (-len(text) % 8)
+    hashed = hashlib.sha256()
+    folder.mkdir(parents=True)
+    with open(folder / "tensors.safetensors", "wb") as file:
+        for piece in (len(text).to_bytes(8, "little"), text, *(numpy.ascontiguousarray(numbers) for _, numbers in ordered)):
+            hashed.update(piece)
+            file.write(piece)
+        size = file.tell()
+    manifest["tensors"] = {"file": "tensors.safetensors", "bytes": size, "sha256": hashed.hexdigest()}
+    (folder / "manifest.json").write_text(json.dumps(manifest))

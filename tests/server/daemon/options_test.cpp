@@ -6,6 +6,7 @@
 #include "core/numerics/error.h"
 #include "server/daemon/command_line.h"
 #include "server/daemon/config_file.h"
+#include "server/daemon/preload.h"
 #include "server/daemon/store_lock.h"
 #include "tests/support/temporary_folder.h"
 
@@ -69,6 +70,25 @@ TEST_CASE("every option shows its value as it would be given") {
 
 TEST_CASE("a configuration file without a name is refused") {
   CHECK_THROWS_WITH(parse({"--config="}), Contains("--config: wants a file"));
+}
+
+TEST_CASE("models to preload are named with version or label, and the policy by its name") {
+  CHECK(parse({"--store", "s"}).preload.empty());
+  CHECK(parse({"--store", "s", "--preload", "all"}).preload == "all");
+  CHECK(preloadListFrom("", "all").all);
+  CHECK(preloadListFrom("", "").models.empty());
+  const auto list = preloadListFrom("--preload", "a,b@3,c@canary");
+  REQUIRE(list.models.size() == 3);
+  CHECK_FALSE(list.all);
+  CHECK((list.models[0].name == "a" && list.models[0].version == 0 && list.models[0].label.empty()));
+  CHECK((list.models[1].name == "b" && list.models[1].version == 3 && list.models[1].label.empty()));
+  CHECK((list.models[2].name == "c" && list.models[2].version == 0 && list.models[2].label == "canary"));
+  for (const auto* text : {",", "a,,b", "a,", "../a", "a@", "a@0", "a@-1", "a@b/c", "a b"})
+    CHECK_THROWS_WITH(parse({"--store", "s", "--preload", text}), Contains("--preload: "));
+  CHECK_FALSE(parse({"--store", "s", "--model-policy", "explicit"}).watch_models);
+  CHECK(parse({"--store", "s", "--model-policy", "watch"}).watch_models);
+  CHECK_THROWS_WITH(parse({"--store", "s", "--model-policy", "poll"}),
+                    Contains("--model-policy: \"poll\", want explicit or"));
 }
 
 TEST_CASE("the command line overrides the configuration file") {

@@ -397,3 +397,75 @@ TEST_CASE("a label's version is handed on, whatever becomes of it meanwhile") {
   CHECK(sha256(files.tensors->bytes()) == before);
   CHECK(before == files.manifest.tensors_sha256);
 }
+
+TEST_CASE("a look takes over what another process changed in the store") {
+  const test::TemporaryFolder folder;
+  publishVersions(folder.path(), 2);
+  ModelStore store(folder.path());
+  const auto copy = [&](int from, int to) {
+    std::filesystem::copy(folder.path() / "m" / std::to_string(from), folder.path() / "m" / std::to_string(to),
+                          std::filesystem::copy_options::recursive);
+  };
+  CHECK(store.look("m").load == nullptr);
+  CHECK(store.look("none").gone.empty());
+  copy(1, 5);
+  const auto appeared = store.look("m");
+  REQUIRE(appeared.load);
+  CHECK(appeared.appeared == 5);
+  const auto fifth = appeared.load->wait();
+  CHECK(store.pin({"m", 0, ""}) == fifth);
+  CHECK(store.look("m").load == nullptr);
+
+  copy(1, 9);
+  std::filesystem::resize_file(folder.path() / "m/9/tensors.safetensors", 100);  // not whole yet
+  CHECK(store.look("m").load == nullptr);
+  std::filesystem::remove_all(folder.path() / "m/9");
+
+  std::filesystem::remove_all(folder.path() / "m/5");
+  const auto gone = store.look("m");
+  CHECK(gone.gone == std::vector<std::uint64_t>{5});
+  CHECK(gone.load == nullptr);
+  CHECK(pinNow(store, {"m", 0, ""})->version == 2);
+  std::filesystem::remove_all(folder.path() / "m");
+  CHECK(store.look("m").gone == std::vector<std::uint64_t>{2});
+  CHECK_THROWS_AS(store.pin({"m", 0, ""}), ModelNotFound);
+}
+
+TEST_CASE("a look passes over a broken version, and finds it again when it has changed") {
+  const test::TemporaryFolder folder;
+  publishVersions(folder.path(), 3);
+  for (const int version : {2, 3})
+    std::filesystem::rename(folder.path() / "m" / std::to_string(version),
+                            folder.path() / ("." + std::to_string(version)));
+  ModelStore store(folder.path());
+  for (const int version : {2, 3})
+    std::filesystem::rename(folder.path() / ("." + std::to_string(version)),
+                            folder.path() / "m" / std::to_string(version));
+  const auto tensors = folder.path() / "m/3/tensors.safetensors";
+  const auto good = readFile(tensors);
+  auto bad = good;
+  bad.back() ^= 1;
+  writeFile(tensors, bad);
+  const auto broken = store.look("m");
+  REQUIRE(broken.appeared == 3);
+  CHECK_THROWS_AS(broken.load->wait(), FileError);
+  const auto next = store.look("m");
+  REQUIRE(next.appeared == 2);
+  CHECK(next.load->wait()->version == 2);
+  CHECK(store.look("m").load == nullptr);
+  writeFile(tensors, good);
+  const auto repaired = store.look("m");
+  REQUIRE(repaired.appeared == 3);
+  CHECK(repaired.load->wait()->version == 3);
+}
+
+TEST_CASE("a version can be fetched whether or not it is in memory") {
+  const test::TemporaryFolder folder;
+  publishVersions(folder.path(), 1);
+  ModelStore store(folder.path());
+  const auto model = store.fetch({"m", 0, ""})->wait();
+  CHECK(model->version == 1);
+  CHECK(store.fetch({"m", 1, ""})->get() == model);
+  CHECK_THROWS_AS(store.fetch({"m", 2, ""}), ModelNotFound);
+  CHECK_THROWS_AS(store.fetch({"n", 0, ""}), ModelNotFound);
+}

@@ -1,0 +1,35 @@
+#pragma once
+
+#include <functional>
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "server/models/model_store.h"
+
+namespace shaped::server {
+
+/// What --preload names: NAME, NAME@VERSION or NAME@LABEL, separated by commas; or all.
+struct PreloadList {
+  bool all = false;  ///< every name of the store
+  std::vector<ModelSelector> models;
+};
+/// Throws InvalidInput naming `where` when there is an empty name, version or label, or a name that can be none.
+PreloadList preloadListFrom(const std::string& where, const std::string& text);
+
+/// Brings models into memory, side by side, and logs what becomes of each. They stay at least until all have come.
+class Preload {
+ public:
+  /// done: called once, from any thread, perhaps before this returns: when each is in memory or has failed.
+  Preload(ModelStore& store, const PreloadList& wanted, std::function<void()> done);
+  /// Nothing is called any more; loads that run go on.
+  ~Preload();
+  Preload(const Preload&) = delete;
+  Preload& operator=(const Preload&) = delete;
+
+ private:
+  class Progress;
+  std::shared_ptr<Progress> progress_;
+};
+
+}  // namespace shaped::server
