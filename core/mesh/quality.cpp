@@ -3,6 +3,7 @@
 #include <Eigen/Geometry>
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <numeric>
 #include <string>
 #include <vector>
@@ -47,11 +48,25 @@ Eigen::VectorXd triangleQualities(const Faces& faces, const Vertices& vertices) 
   return Eigen::VectorXd::NullaryExpr(faces.rows(), quality);
 }
 
-double smallestAreaRatio(const Faces& faces, const Vertices& reference, const Vertices& shape) {
-  if (shape.rows() != reference.rows())
+ReferenceAreas::ReferenceAreas(const Faces& faces, const Vertices& reference)
+    : faces_(faces), vertex_count_(reference.rows()), inverse_squares_(faces_.rows()) {
+  for (Eigen::Index f = 0; f < faces_.rows(); ++f)
+    inverse_squares_[f] = 1 / doubleAreaVector(faces_, reference, f).squaredNorm();
+}
+
+double ReferenceAreas::smallestRatio(const Vertices& shape) const {
+  if (shape.rows() != vertex_count_)
     throw InvalidInput("shape",
-                       "has " + std::to_string(shape.rows()) + " vertices, want " + std::to_string(reference.rows()));
-  return (triangleAreas(faces, shape).array() / triangleAreas(faces, reference).array()).minCoeff();
+                       "has " + std::to_string(shape.rows()) + " vertices, want " + std::to_string(vertex_count_));
+  // One root at the end: this runs for every frame of a stream.
+  double smallest = std::numeric_limits<double>::infinity();
+  for (Eigen::Index f = 0; f < faces_.rows(); ++f)
+    smallest = std::min(smallest, doubleAreaVector(faces_, shape, f).squaredNorm() * inverse_squares_[f]);
+  return std::sqrt(smallest);
+}
+
+double smallestAreaRatio(const Faces& faces, const Vertices& reference, const Vertices& shape) {
+  return ReferenceAreas(faces, reference).smallestRatio(shape);
 }
 
 Vertices faceNormals(const Faces& faces, const Vertices& vertices) {

@@ -13,8 +13,22 @@ Eigen::VectorXd triangleAreas(const Faces& faces, const Vertices& vertices);
 /// for one without area (also for one whose corners coincide).
 Eigen::VectorXd triangleQualities(const Faces& faces, const Vertices& vertices);
 
-/// The smallest of area(shape) / area(reference) over the triangles: 0 when a triangle collapsed. The reference's
-/// triangles must have area (requireValidShape). Throws InvalidInput when the two have different vertex counts.
+/// Areas of one shape's triangles, to compare many others to.
+class ReferenceAreas {
+ public:
+  /// faces: must outlive it. The reference's triangles must have area (requireValidShape).
+  ReferenceAreas(const Faces& faces, const Vertices& reference);
+  /// The smallest of area(shape) / area(reference) over the triangles: 0 when a triangle collapsed. Throws InvalidInput
+  /// when the two have different vertex counts.
+  double smallestRatio(const Vertices& shape) const;
+
+ private:
+  const Faces& faces_;
+  Eigen::Index vertex_count_;
+  Eigen::VectorXd inverse_squares_;  ///< of twice the areas [1/m^4]
+};
+
+/// ReferenceAreas(faces, reference).smallestRatio(shape).
 double smallestAreaRatio(const Faces& faces, const Vertices& reference, const Vertices& shape);
 
 /// Unit normal of each triangle, F x 3, pointing to the side that sees it counter-clockwise; zero where there is no

@@ -31,13 +31,13 @@ void count(const Outcome& outcome, Call& call) {
   call.solved(outcome);
 }
 
-v1::InterpolateResponse summaryOf(const GeodesicCalculus& calculus, const Solved<Path>& path, double seconds) {
+v1::InterpolateResponse summaryOf(const GeodesicCalculus& calculus, const Solved<Path>& path,
+                                  const ReferenceAreas& areas, double seconds) {
   v1::InterpolateResponse response;
   auto& summary = *response.mutable_summary();
   toProto(path, seconds, *summary.mutable_report());
   double ratio = 1;
-  for (const auto& shape : path.solution)
-    ratio = std::min(ratio, smallestAreaRatio(calculus.topology().faces(), path.solution.front(), shape));
+  for (const auto& shape : path.solution) ratio = std::min(ratio, areas.smallestRatio(shape));
   summary.set_smallest_area_ratio(ratio);
   summary.set_path_energy(calculus.pathEnergy(path.solution));
   for (const double energy : calculus.segmentEnergies(path.solution)) summary.add_segment_energies(energy);
@@ -60,7 +60,8 @@ void interpolate(const Limits& limits, const v1::InterpolateRequest& request,
 
   const auto path = calculus.interpolate(from.vertices, to, steps, options);
   count(path, call);
-  write(summaryOf(calculus, path, call.workSeconds()));
+  const ReferenceAreas areas(from.topology->faces(), from.vertices);
+  write(summaryOf(calculus, path, areas, call.workSeconds()));
   for (int i = 0; i < request.times_size(); ++i) {
     const double begin = call.workSeconds();
     const auto shape = calculus.at(path.solution, request.times(i), options);
@@ -71,7 +72,7 @@ void interpolate(const Limits& limits, const v1::InterpolateRequest& request,
     frame.set_time(request.times(i));
     toProto(shape.solution, *from.topology, *frame.mutable_shape());
     toProto(shape, call.workSeconds() - begin, *frame.mutable_report());
-    frame.set_smallest_area_ratio(smallestAreaRatio(from.topology->faces(), from.vertices, shape.solution));
+    frame.set_smallest_area_ratio(areas.smallestRatio(shape.solution));
     write(std::move(response));
   }
 }

@@ -2,7 +2,9 @@
 
 #include <grpcpp/support/server_callback.h>
 
+#include <chrono>
 #include <condition_variable>
+#include <exception>
 #include <functional>
 #include <memory>
 #include <mutex>
@@ -11,9 +13,9 @@
 
 namespace shaped::server {
 
-/// One request, many answers. A worker runs the handler, which writes as it goes; write() waits until the message is on
-/// its way, so that a slow reader slows the handler down instead of filling memory; one that takes nothing for
-/// Runtime::write_patience is given up.
+/// One request, many answers. A worker runs the handler, which writes as it goes; one message is on its way at a time
+/// while the next is made, so that a slow reader slows the handler down instead of filling memory; one that takes
+/// nothing for Runtime::write_patience is given up.
 template <class Request, class Response>
 class ServerStreamCall final : public grpc::ServerWriteReactor<Response>, public PooledCall {
  public:
@@ -29,43 +31,63 @@ class ServerStreamCall final : public grpc::ServerWriteReactor<Response>, public
  private:
   void handle() override {
     requireWellFormed(request_);
-    handler_(
-        request_, [this](Response&& message) { write(std::move(message)); }, call());
+    const auto writer = [this](Response&& message) { write(std::move(message)); };
+    std::exception_ptr failure;
+    try {
+      handler_(request_, writer, call());
+    } catch (...) {
+      failure = std::current_exception();
+    }
+    // The status goes after the last answer.
+    std::unique_lock lock(mutex_);
+    waitUntilTaken(lock);
+    if (failure) std::rethrow_exception(failure);
+    requireArrived();
   }
 
+  /// While this answer is on its way, the handler makes the next one.
   void write(Response&& message) {
     std::unique_lock lock(mutex_);
     call().throwIfStopped();
+    waitUntilTaken(lock);
+    requireArrived();
     message_ = std::move(message);
     writing_ = true;
     lock.unlock();
     this->StartWrite(&message_);
-    lock.lock();
+  }
+
+  void waitUntilTaken(std::unique_lock<std::mutex>& lock) {
+    if (!writing_) return;
+    constexpr std::chrono::milliseconds grace(100);  // for what is nearly through, so that the client learns the cause
+    const auto taken = [this] { return !writing_; };
     call().waitForClient([&] {
-      const auto taken = [this] { return !writing_; };
-      if (written_.wait_for(lock, runtime_.write_patience, taken)) return;
+      const bool in_time =
+          changed_.wait_for(lock, runtime_.write_patience, [this] { return !writing_ || call().stopped(); });
+      if (!writing_ || (in_time && changed_.wait_for(lock, grace, taken))) return;
       // A worker is worth more than a client who does not read.
-      call().stop(StopReason::kReader);
+      if (!in_time) call().stop(StopReason::kReader);
       context_.TryCancel();
-      written_.wait(lock, taken);
+      changed_.wait(lock, taken);
     });
-    if (!arrived_) {
-      call().stop(StopReason::kClient);
-      call().throwIfStopped();
-    }
+  }
+
+  void requireArrived() {
+    if (arrived_) return;
+    call().stop(StopReason::kClient);
+    call().throwIfStopped();
   }
 
   void OnWriteDone(bool ok) override {
     const std::scoped_lock lock(mutex_);
     writing_ = false;
     arrived_ = ok;
-    written_.notify_one();
+    changed_.notify_one();
   }
 
-  /// A write that waits for a client who does not read would wait for ever.
   void interrupt() override {
     const std::scoped_lock lock(mutex_);
-    if (writing_) context_.TryCancel();
+    changed_.notify_one();
   }
 
   void finish(const grpc::Status& status) override { this->Finish(status); }
@@ -75,7 +97,7 @@ class ServerStreamCall final : public grpc::ServerWriteReactor<Response>, public
   const Request& request_;
   Handler handler_;
   std::mutex mutex_;
-  std::condition_variable written_;
+  std::condition_variable changed_;  // a message was taken, or the call stopped
   Response message_;
   bool writing_ = false, arrived_ = true;
 };
