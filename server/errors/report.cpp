@@ -36,6 +36,7 @@ std::string nameOf(Reason reason) { return kNames.at(static_cast<std::size_t>(re
 Reason reasonOf(RefusalCause cause) {
   switch (cause) {
     case RefusalCause::kQueueLength:
+    case RefusalCause::kDeadline:
       return Reason::kServerBusy;
     case RefusalCause::kBytesInFlight:
       return Reason::kBytesInFlight;
@@ -49,6 +50,8 @@ Reason reasonOf(RefusalCause cause) {
       return Reason::kClientStreams;
     case RefusalCause::kWaitingJobs:
       return Reason::kTooManyJobs;
+    case RefusalCause::kStoreLock:
+      return Reason::kStoreLocked;
     case RefusalCause::kMemory:
       return Reason::kOutOfMemory;
     case RefusalCause::kDisk:

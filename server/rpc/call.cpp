@@ -45,7 +45,10 @@ Call::Call(const Runtime& runtime, grpc::CallbackServerContext& context, std::st
   context_.AddInitialMetadata(kTraceparent, trace_.header());
 }
 
-Caller Call::caller() const { return {clientKey(client_, context_.peer()), priorityOf(context_)}; }
+Caller Call::caller() const {
+  const std::chrono::duration<double> left = deadline() - DeadlineTimer::Clock::now();
+  return {clientKey(client_, context_.peer()), priorityOf(context_), method_, left.count()};
+}
 
 void Call::throwIfStopped() const {
   if (stopped()) throw Stopped();

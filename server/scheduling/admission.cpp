@@ -21,6 +21,17 @@ Decision refuse(std::chrono::milliseconds delay, RefusalCause cause, const std::
 
 bool tooLarge(std::size_t there, std::size_t more, std::size_t limit) { return there > 0 && there + more > limit; }
 
+/// What took so long lately may take longer now: whoever is let in is to be answered in time.
+constexpr double kCaution = 1.5;
+
+bool tooLate(const Arrival& arrival) {
+  return arrival.wait > 0 && kCaution * (arrival.wait + arrival.work) > arrival.time_left;
+}
+
+std::string seconds(double time) {
+  return std::to_string(static_cast<std::int64_t>(1000 * std::max(time, 0.0))) + " ms";
+}
+
 std::optional<Decision> refusalOfClient(const Load& load, const ClientLoad& client, const AdmissionLimits& limits,
                                         const Arrival& arrival) {
   const auto no = [&](RefusalCause cause, const std::string& what) {
@@ -52,6 +63,9 @@ std::optional<Decision> refusalOfAll(const Load& load, const AdmissionLimits& li
                                                 : ""));
   if (arrival.entry == Entry::kCall && tooLarge(load.bytes_in_flight, arrival.bytes, limits.bytes_in_flight))
     return no(RefusalCause::kBytesInFlight, count(load.bytes_in_flight, "bytes of requests wait or run"));
+  if (arrival.entry == Entry::kCall && tooLate(arrival))
+    return no(RefusalCause::kDeadline, "its deadline comes in " + seconds(arrival.time_left) +
+                                           ", and it would wait some " + seconds(arrival.wait) + " for a worker");
   return std::nullopt;
 }
 

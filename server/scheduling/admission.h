@@ -2,6 +2,7 @@
 
 #include <chrono>
 #include <cstddef>
+#include <limits>
 #include <string>
 
 #include "server/scheduling/priority.h"
@@ -49,7 +50,11 @@ enum class Entry {
 struct Arrival {
   Entry entry = Entry::kCall;
   Priority priority = Priority::kNormal;
-  std::size_t bytes = 0;  ///< of the message
+  std::size_t bytes = 0;                                       ///< of the message
+  double time_left = std::numeric_limits<double>::infinity();  ///< of a call, until its deadline [s]
+  // By what the like took lately; 0 where nothing is known.
+  double wait = 0;  ///< until a worker takes it up [s]
+  double work = 0;  ///< of that worker [s]
 };
 
 struct Decision {
@@ -65,7 +70,9 @@ std::size_t queueLengthFor(Priority priority, const AdmissionLimits& limits);
 
 /// Whether to let something enter. The client's own limits are looked at first, then those of all. A message that is
 /// larger than a byte limit enters where nothing else counts towards it. An admitted stream is never broken off: its
-/// messages enter always, which is bounded because each stream has at most one in work.
+/// messages enter always, which is bounded because each stream has at most one in work. A call that would have to wait,
+/// and would likely not be answered before its deadline, is refused while its client can still go elsewhere: work on
+/// it would be lost, and in an overload all work would be of that kind.
 /// The retry delay is the time until what is in the way has drained, at least 0.1 and at most 60 s.
 Decision admit(const Load& load, const ClientLoad& client, const AdmissionLimits& limits, const Arrival& arrival);
 

@@ -3,11 +3,16 @@
 #include <algorithm>
 
 namespace shaped::server {
+namespace {
+
+constexpr double kMemory = 0.9;  // of moving averages, per piece of work
+
+}  // namespace
 
 Decision RequestQueue::enter(std::uint64_t id, const Caller& caller, Entry entry, std::size_t bytes) {
   const auto known = clients_.find(caller.client);
   auto decision = admit(load(), known == clients_.end() ? ClientLoad() : known->second.load, limits_,
-                        {entry, caller.priority, bytes});
+                        {entry, caller.priority, bytes, caller.time_left, expectedWait(caller), expected(caller.kind)});
   if (!decision.admitted) return decision;
   auto& client = clientOf(caller.client);
   entry == Entry::kStream ? ++client.load.streams : ++client.load.requests;
@@ -25,20 +30,19 @@ void RequestQueue::push(std::uint64_t id, std::size_t bytes, Work work, Time now
   count(place, bytes);
   auto& line = lineOf(place.caller);
   if (line.tasks.empty()) line.since = now;
-  line.tasks.push_back({id, std::move(work)});
+  line.tasks.push_back({id, expected(place.caller.kind), std::move(work)});
+  line.work += line.tasks.back().expected;
   ++length_;
 }
 
 std::optional<RequestQueue::Work> RequestQueue::withdraw(std::uint64_t id) {
   const auto place = places_.find(id);
   if (place == places_.end()) return std::nullopt;
-  auto& tasks = lineOf(place->second.caller).tasks;
-  const auto found = std::find_if(tasks.begin(), tasks.end(), [id](const Task& task) { return task.id == id; });
-  if (found == tasks.end()) return std::nullopt;
-  auto work = std::move(found->work);
-  tasks.erase(found);
-  --length_;
-  return work;
+  auto& line = lineOf(place->second.caller);
+  const auto found =
+      std::find_if(line.tasks.begin(), line.tasks.end(), [id](const Task& task) { return task.id == id; });
+  if (found == line.tasks.end()) return std::nullopt;
+  return take(line, found).work;
 }
 
 void RequestQueue::leave(std::uint64_t id) {
@@ -67,10 +71,9 @@ RequestQueue::Begun RequestQueue::pop(Time now) {
     }
   const auto& owner = owners.at(next(lines, ageing_));
   auto& line = lineOf(owner);
-  Begun begun{owner.client, std::move(line.tasks.front().work)};
-  line.tasks.pop_front();
+  auto task = take(line, line.tasks.begin());
+  Begun begun{owner.client, places_.at(task.id).caller.kind, std::move(task.work)};
   line.since = now;
-  --length_;
   ++busy_;
   auto& client = clients_.at(begun.client);
   ++client.running;
@@ -78,14 +81,46 @@ RequestQueue::Begun RequestQueue::pop(Time now) {
   return begun;
 }
 
-void RequestQueue::ended(const std::string& name, double seconds) {
-  constexpr double memory = 0.9;  // of the moving average, per piece of work
-  mean_seconds_ = mean_seconds_ == 0 ? seconds : memory * mean_seconds_ + (1 - memory) * seconds;
+void RequestQueue::ended(const std::string& name, const std::string& kind, double seconds) {
+  for (auto* mean : {&mean_seconds_, &mean_of_kind_[kind]})
+    *mean = *mean == 0 ? seconds : kMemory * *mean + (1 - kMemory) * seconds;
   --busy_;
   auto& client = clients_.at(name);
   --client.running;
   client.served += seconds;
   forgetIfGone(name);
+}
+
+RequestQueue::Task RequestQueue::take(Waiting& line, std::deque<Task>::iterator task) {
+  auto taken = std::move(*task);
+  line.tasks.erase(task);
+  line.work = line.tasks.empty() ? 0 : line.work - taken.expected;
+  --length_;
+  return taken;
+}
+
+/// The time that work of this kind took lately; that of all work where it is new.
+double RequestQueue::expected(const std::string& kind) const {
+  const auto known = mean_of_kind_.find(kind);
+  return known == mean_of_kind_.end() ? mean_seconds_ : known->second;
+}
+
+/// Until a worker takes up a request that comes now: what is more urgent goes first, and of other clients' lines of the
+/// same priority as many requests as the client itself has waiting then. Ageing is left out.
+double RequestQueue::expectedWait(const Caller& caller) const {
+  if (length_ == 0 && busy_ < static_cast<std::size_t>(workers_)) return 0;
+  const auto own = clients_.find(caller.client);
+  const auto at = static_cast<std::size_t>(caller.priority);
+  const auto turn = static_cast<double>(own == clients_.end() ? 1 : own->second.lines.at(at).tasks.size() + 1);
+  double work = mean_seconds_;  // of what runs: a worker is free after its share of this
+  for (const auto& [name, client] : clients_)
+    for (const auto priority : kPriorities) {
+      const auto& line = client.lines.at(static_cast<std::size_t>(priority));
+      if (line.tasks.empty() || priority > caller.priority) continue;
+      const bool before = priority < caller.priority || name == caller.client;
+      work += line.work * (before ? 1 : std::min(1.0, turn / static_cast<double>(line.tasks.size())));
+    }
+  return work / workers_;
 }
 
 Load RequestQueue::load() const { return {workers_, busy_, length_, bytes_, streams_, mean_seconds_}; }

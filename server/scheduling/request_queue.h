@@ -5,6 +5,7 @@
 #include <cstdint>
 #include <deque>
 #include <functional>
+#include <limits>
 #include <map>
 #include <optional>
 #include <string>
@@ -15,10 +16,12 @@
 
 namespace shaped::server {
 
-/// Who asks for something, and how urgently.
+/// Who asks for something, how urgently, and for what.
 struct Caller {
   std::string client;  ///< tells clients apart
   Priority priority = Priority::kNormal;
+  std::string kind = {};                                       ///< work of one kind takes about as long each time
+  double time_left = std::numeric_limits<double>::infinity();  ///< of a call, until its deadline [s]
 };
 
 /// What waits, runs and holds a place in a worker pool: the book that admission (admission.h) and order (order.h) are
@@ -32,7 +35,7 @@ class RequestQueue {
   using Work = std::function<void()>;
 
   struct Begun {
-    std::string client;
+    std::string client, kind;
     Work work;
   };
 
@@ -50,8 +53,8 @@ class RequestQueue {
   bool empty() const { return length_ == 0; }
   /// The work that is to run now; not from an empty queue.
   Begun pop(Time now);
-  /// Work of this client that was popped has ended.
-  void ended(const std::string& client, double seconds);
+  /// Work of this client and kind that was popped has ended.
+  void ended(const std::string& client, const std::string& kind, double seconds);
 
   Load load() const;
   const AdmissionLimits& limits() const { return limits_; }
@@ -62,11 +65,13 @@ class RequestQueue {
  private:
   struct Task {
     std::uint64_t id;
+    double expected;  ///< [s]
     Work work;
   };
   struct Waiting {
     std::deque<Task> tasks;
-    Time since;  ///< the line does not move
+    double work = 0;  ///< of all tasks, as expected() had it [s]
+    Time since;       ///< the line does not move
   };
   struct Client {
     ClientLoad load;
@@ -80,6 +85,9 @@ class RequestQueue {
     std::size_t bytes;
   };
 
+  double expected(const std::string& kind) const;
+  double expectedWait(const Caller& caller) const;
+  Task take(Waiting& line, std::deque<Task>::iterator task);
   Waiting& lineOf(const Caller& caller);
   Client& clientOf(const std::string& name);
   void forgetIfGone(const std::string& name);
@@ -92,6 +100,7 @@ class RequestQueue {
   std::unordered_map<std::uint64_t, Place> places_;
   std::size_t length_ = 0, bytes_ = 0, busy_ = 0, streams_ = 0;
   double mean_seconds_ = 0, served_now_ = 0;
+  std::unordered_map<std::string, double> mean_of_kind_;  // [s]
 };
 
 }  // namespace shaped::server

@@ -91,7 +91,7 @@ void WorkerPool::serve() {
     begun.work = nullptr;
     const double seconds = std::chrono::duration<double>(Clock::now() - begin).count();
     lock.lock();
-    queue_.ended(begun.client, seconds);
+    queue_.ended(begun.client, begun.kind, seconds);
   }
 }
 

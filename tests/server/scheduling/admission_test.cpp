@@ -29,8 +29,10 @@ Load load(std::size_t length, std::size_t bytes = 0, std::size_t streams = 0) {
   return {.workers = 2, .busy = 2, .queue_length = length, .bytes_in_flight = bytes, .open_streams = streams};
 }
 
-Arrival call(std::size_t bytes = 10, Priority priority = Priority::kNormal) { return {Entry::kCall, priority, bytes}; }
-Arrival stream(Priority priority = Priority::kNormal) { return {Entry::kStream, priority, 0}; }
+Arrival call(std::size_t bytes = 10, Priority priority = Priority::kNormal) {
+  return {.entry = Entry::kCall, .priority = priority, .bytes = bytes};
+}
+Arrival stream(Priority priority = Priority::kNormal) { return {.entry = Entry::kStream, .priority = priority}; }
 
 const std::vector<Row> table{
     {"nothing there", load(0), {}, call(), {}},
@@ -46,6 +48,11 @@ const std::vector<Row> table{
     {"normal leaves an eighth", load(7), {}, call(), Cause::kQueueLength},
     {"batch takes the last place of its half", load(3), {}, call(1, Priority::kBatch), {}},
     {"batch leaves a half", load(4), {}, call(1, Priority::kBatch), Cause::kQueueLength},
+
+    {"a deadline that can be met", load(2), {}, {Entry::kCall, Priority::kNormal, 1, 3.1, 1, 1}, {}},
+    {"one that likely cannot", load(2), {}, {Entry::kCall, Priority::kNormal, 1, 2.9, 1, 1}, Cause::kDeadline},
+    {"one that cannot, but nobody waits", load(0), {}, {Entry::kCall, Priority::kNormal, 1, 0.1, 0, 1}, {}},
+    {"a stream has none", load(2), {}, {Entry::kStream, Priority::kNormal, 0, 0.1, 1, 1}, {}},
 
     {"a stream enters while there is a place", load(0, 0, 3), {}, stream(), {}},
     {"no place for another stream", load(0, 0, 4), {}, stream(), Cause::kOpenStreams},

@@ -26,7 +26,7 @@ struct Room {
     begun.work();
     now += std::chrono::duration_cast<RequestQueue::Time::duration>(std::chrono::duration<double>(seconds));
     queue.leave(ran.back());
-    queue.ended(begun.client, seconds);
+    queue.ended(begun.client, begun.kind, seconds);
     return ran.back();
   }
   std::vector<std::uint64_t> runAll() {
@@ -97,7 +97,7 @@ TEST_CASE("places, bytes and streams are counted from entering to leaving") {
   CHECK(room.queue.load().bytes_in_flight == 60);  // runs
   CHECK(room.call(3, bob, 50).cause == RefusalCause::kBytesInFlight);
   room.queue.leave(1);
-  room.queue.ended(begun.client, 1);
+  room.queue.ended(begun.client, begun.kind, 1);
   CHECK(room.queue.load().bytes_in_flight == 0);
   CHECK(room.call(3, bob, 50).admitted);
   CHECK(room.call(4, bob, 20).admitted);
@@ -132,9 +132,47 @@ TEST_CASE("a call that waits for something keeps its place") {
   Room room({.queue_length = 1, .client_requests = 1});
   CHECK(room.call(1, ann).admitted);
   const auto begun = room.queue.pop(room.now);
-  room.queue.ended(begun.client, 0.1);  // parked
+  room.queue.ended(begun.client, begun.kind, 0.1);  // parked
   CHECK(room.call(2, ann).cause == RefusalCause::kClientRequests);
   room.queue.push(
       1, 0, [] {}, room.now);
   CHECK(room.queue.load().queue_length == 1);
+}
+
+TEST_CASE("a call that would wait beyond its deadline is refused, by what its kind and those before it took lately") {
+  Room room;
+  const auto in = [](double seconds, const char* client = "ann", Priority priority = Priority::kNormal) {
+    return Caller{client, priority, "edit", seconds};
+  };
+  CHECK(room.call(1, in(1)).admitted);  // nothing is known yet
+  CHECK(room.run(4) == 1);
+  CHECK(room.call(2, in(1)).admitted);  // nobody is before it: whether it can be done is for it to find out
+  room.queue.pop(room.now);
+  // 4 s until the worker is free, 4 s of its own, and half as much again.
+  CHECK_FALSE(room.call(3, in(11.9)).admitted);
+  CHECK(room.call(3, in(12.1)).admitted);
+  CHECK(room.call(4, in(18.1)).admitted);
+  const auto refused = room.call(5, in(23.9));
+  CHECK(refused.cause == RefusalCause::kDeadline);
+  CHECK_THAT(refused.reason, Catch::Contains("deadline comes in 23900 ms") && Catch::Contains("some 12000 ms"));
+  // Who is new waits for one of each other client, not for the whole line; who is more urgent for nobody but who runs.
+  CHECK_FALSE(room.call(5, in(17.9, "bob")).admitted);
+  CHECK(room.call(5, in(18.1, "bob")).admitted);
+  CHECK_FALSE(room.call(6, in(11.9, "bob", Priority::kInteractive)).admitted);
+  CHECK(room.call(6, in(12.1, "bob", Priority::kInteractive)).admitted);
+}
+
+TEST_CASE("what is withdrawn is no longer waited for") {
+  Room room;
+  const Caller patient{"ann", Priority::kNormal, "edit", 1000}, hurried{"ann", Priority::kNormal, "edit", 13};
+  room.call(1, patient);
+  room.run(4);
+  room.call(2, patient);
+  room.queue.pop(room.now);
+  room.call(3, patient);
+  CHECK_FALSE(room.call(4, hurried).admitted);
+  CHECK(room.queue.withdraw(3).has_value());
+  room.queue.leave(3);
+  CHECK(room.call(4, hurried).admitted);
+  CHECK(room.queue.withdraw(4).has_value());
 }
