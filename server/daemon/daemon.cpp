@@ -17,8 +17,6 @@ namespace {
 
 // Lists, uploads and deletions: short, often waiting for the disk.
 constexpr int kLightThreads = 2;
-// Clients that read a job's result slowly hold one each, and are in nobody's way but each other's.
-constexpr int kResultThreads = 4;
 constexpr std::chrono::hours kLongestHeavyCall(12);
 constexpr std::size_t kWaitingJobs = 64;
 constexpr AdmissionLimits kHeavyLimits{.queue_length = 8,
@@ -53,7 +51,6 @@ Daemon::Daemon(const DaemonOptions& options)
       pool_(options.threads, options.admission, alone),
       light_(kLightThreads, options.admission, alone),
       heavy_(1, kHeavyLimits, {}),
-      results_(kResultThreads, options.admission, {}),
       job_context_{datasets_,
                    models_,
                    metrics_,
@@ -65,7 +62,6 @@ Daemon::Daemon(const DaemonOptions& options)
       runtime_{pool_,
                light_,
                heavy_,
-               results_,
                timer_,
                metrics_,
                std::chrono::duration<double>(options.longest_call),
@@ -86,7 +82,7 @@ Daemon::Daemon(const DaemonOptions& options)
   for (const auto& [kind, how] : jobKinds(job_context_))
     for (const auto state : {JobState::kSucceeded, JobState::kFailed, JobState::kCancelled})
       metrics_.declareJobs(kind, nameOf(state));
-  for (auto* pool : {&pool_, &light_, &results_}) pool->setAgeing(options.ageing);
+  for (auto* pool : {&pool_, &light_}) pool->setAgeing(options.ageing);
   if (!options.metrics.empty())
     scrape_ = std::make_unique<HttpListener>("--metrics", options.metrics, scrapeHandler(metrics_, ready_));
   if (options.watch_models) watch_ = std::make_unique<ModelWatch>(models_, options.store / "models");
@@ -108,8 +104,7 @@ void Daemon::setServing(bool serving) {
 }
 
 Surroundings Daemon::surroundings() {
-  return {{poolStatistics("solver", pool_), poolStatistics("light", light_), poolStatistics("heavy", heavy_),
-           poolStatistics("results", results_)},
+  return {{poolStatistics("solver", pool_), poolStatistics("light", light_), poolStatistics("heavy", heavy_)},
           modelMemory(models_),
           jobCounts(job_registry_)};
 }
@@ -156,7 +151,7 @@ void Daemon::reload(const DaemonOptions& options) {
 
 void Daemon::useLimits() {
   setLogLevel(options_.log);
-  for (auto* pool : {&pool_, &light_, &results_}) {
+  for (auto* pool : {&pool_, &light_}) {
     pool->setLimits(options_.admission);
     pool->setAgeing(options_.ageing);
   }

@@ -67,7 +67,7 @@ class Daemon {
   SqliteJobRegistry job_registry_;
   Metrics metrics_;
   DeadlineTimer timer_;
-  WorkerPool pool_, light_, heavy_, results_;
+  WorkerPool pool_, light_, heavy_;
   const JobContext job_context_;
   JobRunner jobs_;
   Runtime runtime_;

@@ -28,7 +28,6 @@ struct Runtime {
   WorkerPool& pool;   ///< solvers
   WorkerPool& light;  ///< what takes milliseconds and must work while the solvers are busy: lists, uploads, jobs
   WorkerPool& heavy;  ///< what takes minutes and must not keep others from a solver: evaluations
-  WorkerPool& results;  ///< what waits for clients that read as fast as they like: results of jobs
   DeadlineTimer& timer;
   Metrics& metrics;
   std::atomic<std::chrono::duration<double>>

@@ -7,8 +7,8 @@
 #include "server/jobs/record_file.h"
 #include "server/rpc/evaluate.h"
 #include "server/rpc/marker_job.h"
+#include "server/rpc/outgoing_stream_call.h"
 #include "server/rpc/project_job.h"
-#include "server/rpc/server_stream_call.h"
 #include "server/rpc/training.h"
 #include "server/rpc/unary_call.h"
 #include "server/rpc/wait_call.h"
@@ -33,27 +33,30 @@ void list(const JobRegistry& registry, const v1::ListJobsRequest& request, v1::L
   for (const auto& record : records) toProto(record, *response.add_jobs());
 }
 
-using WriteAnswer = std::function<void(const v1::GetJobResultResponse&)>;
+using ResultCall = OutgoingStreamCall<v1::GetJobResultRequest, v1::GetJobResultResponse>;
 
-void sendResult(const JobRunner& runner, const v1::GetJobResultRequest& request, const WriteAnswer& write) {
-  RecordReader reader(runner.resultOf(request.id()));
-  std::string record;
-  v1::GetJobResultResponse answer;
-  for (std::uint64_t index = 0; reader.next(record); ++index) {
-    if (index < request.skip()) continue;
+/// The answers of a job, from the first that is not skipped.
+ResultCall::Next answersOf(const JobRunner& runner, const v1::GetJobResultRequest& request) {
+  auto reader = std::make_shared<RecordReader>(runner.resultOf(request.id()));
+  return [reader, id = request.id(), skip = request.skip(), record = std::string(), index = std::uint64_t{0}](
+             v1::GetJobResultResponse& answer, Call&) mutable {
+    do
+      if (!reader->next(record)) return false;
+    while (index++ < skip);
     if (!answer.ParseFromString(record))
-      throw Corrupted("the result of job " + request.id() + " cannot be read at answer " + std::to_string(index));
-    write(answer);
-  }
+      throw Corrupted("the result of job " + id + " cannot be read at answer " + std::to_string(index - 1));
+    return true;
+  };
 }
 
 }  // namespace
 
 grpc::ServerUnaryReactor* JobsService::Train(grpc::CallbackServerContext* context, const v1::TrainRequest* request,
                                              v1::TrainResponse* response) {
-  return startUnary<v1::TrainRequest, v1::TrainResponse>(
-      runtime_, runtime_.light, "Jobs.Train", context, request, response,
-      [this](const auto& wanted, auto& answer, Call&) { toProto(startTraining(desk_, wanted), *answer.mutable_job()); });
+  return startUnary<v1::TrainRequest, v1::TrainResponse>(runtime_, runtime_.light, "Jobs.Train", context, request,
+                                                         response, [this](const auto& wanted, auto& answer, Call&) {
+                                                           toProto(startTraining(desk_, wanted), *answer.mutable_job());
+                                                         });
 }
 
 grpc::ServerUnaryReactor* JobsService::Evaluate(grpc::CallbackServerContext* context,
@@ -67,8 +70,7 @@ grpc::ServerUnaryReactor* JobsService::Evaluate(grpc::CallbackServerContext* con
 }
 
 grpc::ServerUnaryReactor* JobsService::Project(grpc::CallbackServerContext* context,
-                                               const v1::ProjectJobRequest* request,
-                                               v1::ProjectJobResponse* response) {
+                                               const v1::ProjectJobRequest* request, v1::ProjectJobResponse* response) {
   return startUnary<v1::ProjectJobRequest, v1::ProjectJobResponse>(
       runtime_, runtime_.light, "Jobs.Project", context, request, response,
       [this](const auto& wanted, auto& answer, Call& call) {
@@ -84,9 +86,9 @@ grpc::ServerReadReactor<v1::FitMarkersJobRequest>* JobsService::FitMarkers(grpc:
 
 grpc::ServerWriteReactor<v1::GetJobResultResponse>* JobsService::GetResult(grpc::CallbackServerContext* context,
                                                                            const v1::GetJobResultRequest* request) {
-  return startServerStream<v1::GetJobResultRequest, v1::GetJobResultResponse>(
-      runtime_, runtime_.results, "Jobs.GetResult", context, request,
-      [this](const auto& wanted, const auto& write, Call&) { sendResult(runner_, wanted, write); });
+  return startOutgoing<v1::GetJobResultRequest, v1::GetJobResultResponse>(
+      runtime_, runtime_.light, "Jobs.GetResult", context, request,
+      [this](const auto& wanted, Call&) { return answersOf(runner_, wanted); });
 }
 
 grpc::ServerUnaryReactor* JobsService::Get(grpc::CallbackServerContext* context, const v1::GetJobRequest* request,

@@ -36,7 +36,7 @@ struct MethodStatistics {
 };
 
 struct PoolStatistics {
-  std::string name;  ///< "solver", "light", "heavy", "results"
+  std::string name;  ///< "solver", "light", "heavy"
   Load load;
   AdmissionLimits limits;
 };
