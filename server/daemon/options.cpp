@@ -4,7 +4,7 @@
 
 #include "core/io/text_scanner.h"
 #include "core/numerics/error.h"
-#include "server/daemon/preload.h"
+#include "server/daemon/preload_list.h"
 #include "server/telemetry/call_log.h"
 
 namespace shaped::server {
@@ -230,10 +230,11 @@ std::vector<OptionSpec> limitOptions() {
       countOption(
           "max-job-megabytes", "N", When::kAtStart, kMostMegabytes, [](auto& o) -> auto& { return o.limits.job_bytes; },
           "most that is sent for one job, and largest result of one [MiB]", 1 << 20),
-      "max-upload-megabytes", "N", When::kAtStart, kMostCount, [](auto& o) -> auto& {return o.limits.upload_bytes;
-}, "largest model that an upload may bring [MiB]",
+      countOption(
+          "max-upload-megabytes", "N", When::kAtStart, kMostCount,
+          [](auto& o) -> auto& { return o.limits.upload_bytes; }, "largest model that an upload may bring [MiB]",
           1 << 20),
-};  // namespace
+  };  // namespace
 }  // namespace shaped::server
 
 std::vector<OptionSpec> securityOptions() {

@@ -2,20 +2,11 @@
 
 #include <functional>
 #include <memory>
-#include <string>
-#include <vector>
 
+#include "server/daemon/preload_list.h"
 #include "server/models/model_store.h"
 
 namespace shaped::server {
-
-/// What --preload names: NAME, NAME@VERSION or NAME@LABEL, separated by commas; or all.
-struct PreloadList {
-  bool all = false;  ///< every name of the store
-  std::vector<ModelSelector> models;
-};
-/// Throws InvalidInput naming `where` when there is an empty name, version or label, or a name that can be none.
-PreloadList preloadListFrom(const std::string& where, const std::string& text);
 
 /// Brings models into memory, side by side, and logs what becomes of each. They stay at least until all have come.
 class Preload {
