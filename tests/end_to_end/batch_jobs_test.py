@@ -131,6 +131,9 @@ class Limited(Trained):
         failed = self.shapectl(*fit, "-o", self.folder / "none.npy", "--job")
         self.assertEqual(failed.code, BAD_INPUT, failed.out)
         self.assertIn("--max-job-megabytes", failed.json["error"]["message"])
+        until = time.monotonic() + 20  # the record says first that it has failed
+        while list((self.folder / "store/jobs").iterdir()) and time.monotonic() < until:
+            time.sleep(0.02)
         self.assertEqual(list((self.folder / "store/jobs").iterdir()), [])
 
 

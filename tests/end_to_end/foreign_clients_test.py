@@ -109,7 +109,7 @@ class ForeignClients(unittest.TestCase):
         self.assertLess(seen["server_stream"]["far"], 1e-3)
         self.assertEqual(seen["both_streams"], {"answers": [[0, 1, True], [1, 1, True]], "more": 0})
         busy = seen["busy"]
-        self.check_error(busy, "RESOURCE_EXHAUSTED", "SERVER_BUSY", None, "streams are open")
+        self.check_error(busy, "RESOURCE_EXHAUSTED", "OPEN_STREAMS", None, "streams are open")
         self.assertGreater(busy["retry_seconds"], 0)
         self.assertIn(busy["open"], range(1, int(OPEN_STREAMS) + 1))
         deadline = seen["deadline"]
