@@ -19,6 +19,17 @@ Eigen::RowVector3d doubleAreaVector(const Faces& faces, const Vertices& vertices
   return (vertices.row(faces(face, 1)) - origin).cross(vertices.row(faces(face, 2)) - origin);
 }
 
+/// The squared length of doubleAreaVector(), by plain numbers, which compilers turn into several times faster code.
+inline double squaredDoubleArea(const Faces& faces, const Vertices& vertices, Eigen::Index face) {
+  const auto* corners = faces.data() + 3 * face;
+  const double* a = vertices.data() + 3 * static_cast<Eigen::Index>(corners[0]);
+  const double* b = vertices.data() + 3 * static_cast<Eigen::Index>(corners[1]);
+  const double* c = vertices.data() + 3 * static_cast<Eigen::Index>(corners[2]);
+  const double u[3] = {b[0] - a[0], b[1] - a[1], b[2] - a[2]}, v[3] = {c[0] - a[0], c[1] - a[1], c[2] - a[2]};
+  const double x = u[1] * v[2] - u[2] * v[1], y = u[2] * v[0] - u[0] * v[2], z = u[0] * v[1] - u[1] * v[0];
+  return x * x + y * y + z * z;
+}
+
 void normalizeRows(Vertices& rows) {
   for (Eigen::Index i = 0; i < rows.rows(); ++i) rows.row(i) = rows.row(i).stableNormalized();
 }
@@ -50,8 +61,7 @@ Eigen::VectorXd triangleQualities(const Faces& faces, const Vertices& vertices) 
 
 ReferenceAreas::ReferenceAreas(const Faces& faces, const Vertices& reference)
     : faces_(faces), vertex_count_(reference.rows()), inverse_squares_(faces_.rows()) {
-  for (Eigen::Index f = 0; f < faces_.rows(); ++f)
-    inverse_squares_[f] = 1 / doubleAreaVector(faces_, reference, f).squaredNorm();
+  for (Eigen::Index f = 0; f < faces_.rows(); ++f) inverse_squares_[f] = 1 / squaredDoubleArea(faces_, reference, f);
 }
 
 double ReferenceAreas::smallestRatio(const Vertices& shape) const {
@@ -61,7 +71,7 @@ double ReferenceAreas::smallestRatio(const Vertices& shape) const {
   // One root at the end: this runs for every frame of a stream.
   double smallest = std::numeric_limits<double>::infinity();
   for (Eigen::Index f = 0; f < faces_.rows(); ++f)
-    smallest = std::min(smallest, doubleAreaVector(faces_, shape, f).squaredNorm() * inverse_squares_[f]);
+    smallest = std::min(smallest, squaredDoubleArea(faces_, shape, f) * inverse_squares_[f]);
   return std::sqrt(smallest);
 }
 
