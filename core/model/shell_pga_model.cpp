@@ -55,7 +55,7 @@ std::size_t ShellPgaModel::bytes() const {
     numbers += static_cast<std::size_t>(shape->size());
   numbers += 2 * numbersOf(parts_.pga);  // the submanifold has a copy
   return numbers * sizeof(double) + bytesOf(parts_.topology) + bytesOf(parts_.coarsening.coarse) +
-         bytesOf(parts_.detail) + prolongation_.bytes();
+         bytesOf(parts_.detail) + prolongation_.bytes() + submanifold_->bytes();
 }
 
 Vertices ShellPgaModel::restrict(const Vertices& shape, const std::string& field) const {

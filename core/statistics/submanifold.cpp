@@ -44,6 +44,12 @@ Submanifold::Submanifold(std::shared_ptr<const GeodesicCalculus> calculus, std::
   }
 }
 
+std::size_t Submanifold::bytes() const {
+  auto numbers = distances_.size() + forces_.size();
+  for (const auto& one : measures_) numbers += one.squared_length.size() + one.area.size() + one.angle.size();
+  return sizeof(double) * static_cast<std::size_t>(numbers);
+}
+
 std::vector<std::size_t> Submanifold::vertexIndices(int modes) const {
   const auto all = static_cast<std::size_t>(pga_->modes());
   if (modes < 0 || modes > pga_->modes())

@@ -43,6 +43,8 @@ class Submanifold {
 
   const ShellPga& pga() const { return *pga_; }
   const GeodesicCalculus& calculus() const { return *calculus_; }
+  /// Memory of what is kept beside mean and variations: their measures [bytes].
+  std::size_t bytes() const;
 
   /// q(alpha), the minimiser of (26), started from `start`.
   Solved<Vertices> average(const Eigen::VectorXd& alpha, const Vertices& start,
