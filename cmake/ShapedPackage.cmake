@@ -9,6 +9,11 @@ install(FILES deploy/systemd/shaped.service DESTINATION lib/systemd/system)
 install(FILES deploy/shaped.yaml DESTINATION /etc/shaped)
 install(FILES deploy/package/copyright NOTICE README.md CHANGELOG.md docs/api.md docs/dependencies.md docs/files.md docs/operations.md
         DESTINATION ${CMAKE_INSTALL_DATADIR}/doc/shaped)
+# CHOLMOD is linked from its archive where there is one, and then no package of its own brings its licence.
+if(SHAPED_SUPERNODAL)
+  install(FILES /usr/share/doc/libsuitesparse-dev/copyright DESTINATION ${CMAKE_INSTALL_DATADIR}/doc/shaped
+          RENAME copyright.suitesparse)
+endif()
 install(DIRECTORY proto/shaped proto/google DESTINATION ${CMAKE_INSTALL_DATADIR}/shaped/proto)
 install(DIRECTORY deploy/monitoring deploy/load-balancing DESTINATION ${CMAKE_INSTALL_DATADIR}/shaped)
 

@@ -77,7 +77,7 @@ class Image(unittest.TestCase):
             self.assertNotIn(unwanted, names)
         self.assertEqual([path for path in files if path.stat().st_mode & 0o6000], [])
         self.assertEqual([path for path in files if path.suffix in (".a", ".h")], [])
-        for needed in ("usr/share/doc/shaped/copyright", "usr/share/doc/libcholmod3/copyright", "etc/ssl/certs/ca-certificates.crt"):
+        for needed in ("usr/share/doc/shaped/copyright", "usr/share/doc/shaped/copyright.suitesparse", "etc/ssl/certs/ca-certificates.crt"):
             self.assertTrue((self.root / needed).is_file(), needed)
 
     def test_it_says_how_to_be_run(self):
