@@ -25,12 +25,20 @@ std::optional<TraceContext> parentOf(const grpc::CallbackServerContext& context)
   return parseTraceparent({first->second.data(), first->second.size()});
 }
 
+/// gRPC tells the deadline in the time of day, computed anew at each question: taken over at once, before that jumps.
+DeadlineTimer::Clock::time_point deadlineOf(const grpc::CallbackServerContext& context) {
+  using TimeOfDay = std::chrono::system_clock;
+  const auto deadline = context.deadline();
+  if (deadline == TimeOfDay::time_point::max()) return DeadlineTimer::Clock::time_point::max();
+  return DeadlineTimer::Clock::now() + (deadline - TimeOfDay::now());
+}
+
 }  // namespace
 
 Call::Call(const Runtime& runtime, grpc::CallbackServerContext& context, std::string method,
            std::chrono::duration<double> cap)
     : context_(context),
-      client_deadline_(context.deadline()),
+      client_deadline_(deadlineOf(context)),
       metrics_(runtime.metrics),
       id_(nextRequestId()),
       method_(std::move(method)),

@@ -14,7 +14,7 @@ namespace shaped::server {
 /// Runs callbacks at their time, on one thread of its own. Callbacks must be quick and must not throw.
 class DeadlineTimer {
  public:
-  using Clock = std::chrono::system_clock;  // gRPC's deadlines are in it
+  using Clock = std::chrono::steady_clock;  // nobody sets it: no wait grows or ends when the time of day is corrected
   using Id = std::pair<Clock::time_point, std::uint64_t>;
 
   DeadlineTimer();

@@ -3,14 +3,21 @@
 Debian's libfaketime (package faketime) gives the daemon its own time of day, read from a file whenever it asks. The clock that
 counts from the machine's start is left alone, as it is when an operator or NTP sets the time."""
 
+import importlib
 import pathlib
 import tempfile
 import time
 import unittest
 
+import grpc
+
+import messages  # makes the modules of all messages
+from scrape import scrape
 from support import NOT_CONVERGED, SUCCESS, Daemon, DaemonCase, skip_loudly, tube, write_mesh, write_tubes
 
+models_pb2 = importlib.import_module("shaped.v1.models_pb2")
 LIBRARY = next(pathlib.Path("/usr/lib").glob("*/faketime/libfaketimeMT.so.1"), None)
+WAIT = "Models.WaitUntilReady"
 PATIENCE = 60  # [s] for what takes milliseconds on a machine with nothing else to do
 
 
@@ -97,6 +104,57 @@ class Jobs(ClockCase):
             self.assertIn(self.shapectl("score", name, self.meshes[1]).code, (SUCCESS, NOT_CONVERGED))
         self.train("later")
         self.assertEqual(self.jobs(), [("later", "succeeded")])
+
+
+class Calls(ClockCase):
+    """Calls that wait for a model which is not there."""
+
+    def wait_for_model(self, channel, name="tubes", timeout=None):
+        before = self.in_flight()
+        call = channel.unary_unary("/shaped.v1.Models/WaitUntilReady", models_pb2.WaitUntilReadyRequest.SerializeToString,
+                                   models_pb2.WaitUntilReadyResponse.FromString)
+        waiting = call.future(models_pb2.WaitUntilReadyRequest(model={"name": name}), timeout=timeout)
+        self.wait(lambda: self.in_flight() == before + 1, "it waits")
+        return waiting
+
+    def in_flight(self):
+        return scrape(self.daemon).value("shaped_requests_in_flight", method=WAIT)
+
+    def late(self):
+        return scrape(self.daemon).value("shaped_requests_total", method=WAIT, code="DEADLINE_EXCEEDED")
+
+    def assertLate(self, waiting):
+        self.assertEqual(waiting.exception(PATIENCE).code(), grpc.StatusCode.DEADLINE_EXCEEDED)
+        self.wait(lambda: self.late() == 1, "the daemon calls it a deadline, too")
+        self.assertEqual(self.in_flight(), 0)
+
+    def test_set_back_a_clients_deadline_passes_as_before(self):
+        self.start("+0")
+        with grpc.insecure_channel(self.daemon.address) as channel:
+            waiting = self.wait_for_model(channel, timeout=5)
+            self.set_clock("-1h")
+            self.assertLate(waiting)
+
+    def test_set_back_the_cap_ends_a_call_as_before(self):
+        self.start("+0", "--longest-call", "5")
+        with grpc.insecure_channel(self.daemon.address) as channel:
+            waiting = self.wait_for_model(channel)
+            self.set_clock("-1h")
+            self.assertLate(waiting)
+
+    def test_set_ahead_no_call_ends(self):
+        self.start("+0")
+        with grpc.insecure_channel(self.daemon.address) as channel:
+            waiting = self.wait_for_model(channel, timeout=300)
+            short = self.wait_for_model(channel, "other", timeout=3)
+            self.set_clock("+10h")
+            # When this one's time is up the daemon looks at the others' as well.
+            self.assertEqual(short.exception(PATIENCE).code(), grpc.StatusCode.DEADLINE_EXCEEDED)
+            self.wait(lambda: self.in_flight() <= 1, "the short one has ended")
+            time.sleep(1)
+            self.assertEqual(self.in_flight(), 1)
+            self.train("tubes")
+            self.assertEqual(waiting.result(PATIENCE).model.name, "tubes")
 
 
 if __name__ == "__main__":

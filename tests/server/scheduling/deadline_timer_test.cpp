@@ -8,6 +8,8 @@
 using namespace shaped::server;
 using namespace std::chrono_literals;
 
+static_assert(DeadlineTimer::Clock::is_steady, "whoever sets the time of day must not move deadlines");
+
 TEST_CASE("callbacks run at their time, the earlier first whatever the order of scheduling") {
   DeadlineTimer timer;
   std::mutex mutex;
