@@ -86,11 +86,18 @@ DatasetUpload::DatasetUpload(DatasetStore& store, std::string name, TopologyPtr 
       frames_(frames),
       folder_(std::move(folder)) {
   fs::create_directory(folder_);
-  writeFaces(folder_, topology_->faces());
-  writer_.emplace(folder_ / kFrames);
+  try {
+    writeFaces(folder_, topology_->faces());
+    writer_.emplace(folder_ / kFrames);
+  } catch (...) {  // on a full disk; what has not been made has no destructor that would clear away
+    discard();
+    throw;
+  }
 }
 
-DatasetUpload::~DatasetUpload() {
+DatasetUpload::~DatasetUpload() { discard(); }
+
+void DatasetUpload::discard() {
   writer_.reset();
   std::error_code ignored;  // what stays behind is removed at the next start
   fs::remove_all(folder_, ignored);

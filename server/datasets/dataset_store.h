@@ -55,6 +55,7 @@ class DatasetUpload {
   friend class DatasetStore;
   DatasetUpload(DatasetStore& store, std::string name, TopologyPtr topology, std::int64_t frames,
                 std::filesystem::path folder);
+  void discard();
 
   DatasetStore& store_;
   const std::string name_;

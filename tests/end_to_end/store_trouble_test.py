@@ -158,8 +158,8 @@ class Full(StoreCase):
         (self.mount.path / "filler").unlink()
 
     def files(self, folder):
-        """All that anybody is served."""
-        return sorted(str(path.relative_to(self.store)) for path in (self.store / folder).rglob("*") if ".scratch-" not in str(path))
+        """All of it, scratch folders too."""
+        return sorted(str(path.relative_to(self.store)) for path in (self.store / folder).rglob("*"))
 
     def disk_full(self, *words):
         refused = self.expect(UNAVAILABLE, *words).json["error"]
