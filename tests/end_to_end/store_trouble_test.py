@@ -1,6 +1,5 @@
 """The store of a daemon is full, read-only, or holds what it should not: what is refused, what goes on, and what is left."""
 
-import importlib
 import json
 import pathlib
 import shutil
@@ -8,14 +7,9 @@ import tempfile
 import time
 import unittest
 
-import grpc
-
 import mounts
-from messages import Refusal
 from support import INTERNAL, NOT_CONVERGED, SUCCESS, UNAVAILABLE, Daemon, DaemonCase, tube, write_mesh, write_tubes
-from transfer_test import FILES, PIECE, read_files, restated, sha256, with_header, write_files
-
-models_pb2 = importlib.import_module("shaped.v1.models_pb2")
+from transfer_test import FILES, read_files, restated, with_header, write_files
 
 PATIENCE = 120  # [s] for what takes seconds on a machine with nothing else to do
 READ_ONLY = "Read-only file system"
@@ -48,27 +42,6 @@ class StoreCase(DaemonCase):
     def trained(self, *names):
         for name in names:
             self.expect(SUCCESS, *self.train(name))
-        self.copy = read_files(self.store / "models" / names[0] / "1")
-
-    def upload(self, name):
-        """The files of the model "tubes" as a new version of that name; None when all went well, else what was refused."""
-        manifest, tensors = self.copy
-
-        def messages():
-            yield models_pb2.UploadModelRequest(header={"name": name, "files": {
-                "manifest": manifest, "manifest_sha256": sha256(manifest), "tensors_sha256": sha256(tensors),
-                "tensors_bytes": len(tensors)}})
-            for begin in range(0, len(tensors), PIECE):
-                yield models_pb2.UploadModelRequest(tensors=tensors[begin:begin + PIECE])
-
-        with grpc.insecure_channel(self.daemon.address) as channel:
-            call = channel.stream_unary("/shaped.v1.Models/Upload", models_pb2.UploadModelRequest.SerializeToString,
-                                        models_pb2.UploadModelResponse.FromString)
-            try:
-                call(messages(), timeout=PATIENCE)
-                return None
-            except grpc.RpcError as error:
-                return Refusal(error)
 
     def train_slowly(self, name):
         """A job that takes some seconds and runs now; its id."""
@@ -115,15 +88,14 @@ class ReadOnly(StoreCase):
         self.store = disk.path / "store"
         self.start("--publish-patience", "1")
         self.trained("tubes", "later")
+        self.expect(SUCCESS, "download", "tubes", self.folder / "copy")
         self.expect(SUCCESS, "unload", "later")
         running = self.train_slowly("running")
         disk.fail()
         for name in ("tubes", "later"):  # the one in memory, and one that is still to be read
             self.assertServed(name)
-        refused = self.upload("new")
-        self.assertEqual((refused.code, refused.reason), (grpc.StatusCode.INTERNAL, "FILE_FAILURE"), refused.text)
-        self.assertIn(READ_ONLY, refused.text)
-        for words in (self.train("new"), ("label", "tubes@1", "stable"), ("delete", "tubes@1"),
+        self.expect(SUCCESS, "download", "tubes", self.folder / "again")
+        for words in (self.train("new"), ("upload", "new", self.folder / "copy"), ("label", "tubes@1", "stable"), ("delete", "tubes@1"),
                       ("evaluate", "tubes", "--detach")):
             refused = self.expect(INTERNAL, *words).json["error"]
             self.assertEqual(refused["reason"], "FILE_FAILURE", refused)
@@ -169,17 +141,17 @@ class Full(StoreCase):
     def test_uploads(self):
         self.start()
         self.trained("tubes")
+        self.expect(SUCCESS, "download", "tubes", self.folder / "copy")
         datasets, models = self.files("datasets"), self.files("models")
         self.fill()
         self.meshes[0] = write_mesh(self.folder / "other.obj", *tube(0.33))  # another dataset
         self.disk_full(*self.train("other"))
-        refused = self.upload("copy")
-        self.assertEqual((refused.code, refused.reason), (grpc.StatusCode.RESOURCE_EXHAUSTED, "DISK_FULL"), refused.text)
+        self.disk_full("upload", "copy", self.folder / "copy")
         self.assertServed("tubes")
         self.assertEqual((self.files("datasets"), self.files("models")), (datasets, models))
         self.make_room()
         self.trained("other")
-        self.assertIsNone(self.upload("copy"))
+        self.expect(SUCCESS, "upload", "copy", self.folder / "copy")
         self.assertEqual(sorted(self.names()), ["copy", "other", "tubes"])
 
     def test_a_training_waits_for_room_before_it_publishes(self):
