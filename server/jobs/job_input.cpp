@@ -10,10 +10,21 @@ std::filesystem::path made(const std::filesystem::path& folder) {
   return folder;
 }
 
+/// Leaves no folder behind where there is no room for the file: what has not been made has no destructor.
+RecordWriter opened(const std::filesystem::path& folder) {
+  try {
+    return {folder / kInputFile, 0};
+  } catch (...) {
+    std::error_code ignored;
+    std::filesystem::remove_all(folder, ignored);
+    throw;
+  }
+}
+
 }  // namespace
 
 JobInput::JobInput(const std::filesystem::path& jobs, std::string key)
-    : key_(std::move(key)), folder_(made(jobs / key_)), writer_(folder_ / kInputFile, 0) {}
+    : key_(std::move(key)), folder_(made(jobs / key_)), writer_(opened(folder_)) {}
 
 JobInput::~JobInput() {
   if (released_) return;

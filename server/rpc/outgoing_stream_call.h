@@ -109,13 +109,14 @@ class OutgoingStreamCall final : public grpc::ServerWriteReactor<Response>,
 
   void end(const grpc::Status& status) {
     state_ = State::kEnded;
-    if (call_.finishOnce(status)) this->Finish(status);
+    if (!call_.finishOnce(status)) return;
+    pool_.leave(call_.id());  // before the answer, as PooledCall does
+    this->Finish(status);
   }
 
   void OnCancel() override { onStop(StopReason::kClient); }
   void OnDone() override {
     runtime_.timer.cancel(timer_);
-    pool_.leave(call_.id());
     const auto self = std::move(self_);
   }
 
