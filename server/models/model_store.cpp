@@ -137,18 +137,20 @@ PendingModelPtr ModelStore::load(const std::string& name, std::uint64_t version)
 PendingModelPtr ModelStore::startLoad(const Key& key) {
   auto& slot = slots_[key];
   if (slot.pending) return slot.pending;
-  slot.pending = std::make_shared<PendingModel>();
-  onLoader([this, key, pending = slot.pending] { runLoad(key, pending); });
-  return slot.pending;
+  const auto pending = std::make_shared<PendingModel>();
+  onLoader([this, key, pending] { runLoad(key, pending); });
+  slot.pending = pending;  // only now: without a loader nobody would ever end it
+  return pending;
 }
 
 /// Call with the mutex held.
 void ModelStore::onLoader(std::function<void()> work) {
   const auto id = ++loads_;
-  loaders_.submit(id, {}, 0, [this, id, work = std::move(work)] {
+  const auto decision = loaders_.submit(id, {}, 0, [this, id, work = std::move(work)] {
     work();
     loaders_.leave(id);
   });
+  if (!decision.admitted) throw std::bad_alloc();  // no limits: there is no thread to be had
 }
 
 void ModelStore::runLoad(const Key& key, const PendingModelPtr& pending) {

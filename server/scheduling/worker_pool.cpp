@@ -1,17 +1,22 @@
 #include "server/scheduling/worker_pool.h"
 
 #include <chrono>
+#include <system_error>
 
 namespace shaped::server {
 namespace {
 
 using Clock = std::chrono::steady_clock;
 
+Decision noThread() {
+  return {false, RefusalCause::kMemory, "the system lets the daemon start no thread", std::chrono::seconds(1)};
+}
+
 }  // namespace
 
-WorkerPool::WorkerPool(int threads, AdmissionLimits limits, const Around& around) : queue_(threads, limits) {
-  for (int i = 0; i < threads; ++i)
-    threads_.emplace_back([this, around] { around ? around([this] { serve(); }) : serve(); });
+WorkerPool::WorkerPool(int threads, AdmissionLimits limits, Around around)
+    : around_(std::move(around)), queue_(threads, limits) {
+  threads_.reserve(static_cast<std::size_t>(threads));
 }
 
 WorkerPool::~WorkerPool() {
@@ -23,12 +28,30 @@ WorkerPool::~WorkerPool() {
   for (auto& thread : threads_) thread.join();
 }
 
+/// One thread more; false where the system gives none, or the pool is about to end.
+bool WorkerPool::hire() try {
+  if (stopping_) return false;
+  threads_.emplace_back([this] { around_ ? around_([this] { serve(); }) : serve(); });
+  ++idle_;
+  return true;
+} catch (const std::system_error&) {
+  return false;
+}
+
+/// Where there can be no thread more, those that are there work it off.
+void WorkerPool::hireWhereWorkWaits() {
+  const auto load = queue_.load();
+  if (idle_ < load.queue_length && threads_.size() < static_cast<std::size_t>(load.workers)) hire();
+}
+
 Decision WorkerPool::submit(std::uint64_t id, const Caller& caller, std::size_t bytes, Work work) {
   {
     const std::scoped_lock lock(mutex_);
+    if (!staffed()) return noThread();
     auto decision = queue_.enter(id, caller, Entry::kCall, bytes);
     if (!decision.admitted) return decision;
     queue_.push(id, bytes, std::move(work), Clock::now());
+    hireWhereWorkWaits();
   }
   wake_.notify_one();
   return {};
@@ -36,6 +59,7 @@ Decision WorkerPool::submit(std::uint64_t id, const Caller& caller, std::size_t 
 
 Decision WorkerPool::openStream(std::uint64_t id, const Caller& caller) {
   const std::scoped_lock lock(mutex_);
+  if (!staffed()) return noThread();
   return queue_.enter(id, caller, Entry::kStream, 0);
 }
 
@@ -43,6 +67,7 @@ void WorkerPool::proceed(std::uint64_t id, std::size_t bytes, Work work) {
   {
     const std::scoped_lock lock(mutex_);
     queue_.push(id, bytes, std::move(work), Clock::now());
+    hireWhereWorkWaits();
   }
   wake_.notify_one();
 }
@@ -83,6 +108,7 @@ void WorkerPool::serve() {
   std::unique_lock lock(mutex_);
   while (true) {
     wake_.wait(lock, [this] { return stopping_ || !queue_.empty(); });
+    --idle_;
     if (stopping_) return;
     auto begun = queue_.pop(Clock::now());
     lock.unlock();
@@ -91,6 +117,7 @@ void WorkerPool::serve() {
     begun.work = nullptr;
     const double seconds = std::chrono::duration<double>(Clock::now() - begin).count();
     lock.lock();
+    ++idle_;
     queue_.ended(begun.client, begun.kind, seconds);
   }
 }

@@ -11,7 +11,10 @@
 
 namespace shaped::server {
 
-/// A fixed number of threads that work off a bounded queue, in the order of order.h. Safe to use from any thread.
+/// Threads that work off a bounded queue, in the order of order.h. Safe to use from any thread.
+///
+/// A thread is started when work waits and none is free, up to the pool's number, and then stays: each takes a tenth of
+/// a megabyte (stack, and what libraries keep for every thread), which a daemon that has nothing to do need not hold.
 ///
 /// Work must not throw. What waits can be withdrawn by its id, which decides races: either withdraw() returns true and
 /// the work never runs, or a worker has taken it. Whoever was admitted holds a place until leave().
@@ -21,14 +24,15 @@ class WorkerPool {
   using Around = std::function<void(const std::function<void()>& serve)>;
   using Work = RequestQueue::Work;
 
-  /// threads >= 1.
-  WorkerPool(int threads, AdmissionLimits limits, const Around& around);
+  /// threads: the most there may be, >= 1.
+  WorkerPool(int threads, AdmissionLimits limits, Around around);
   /// Finishes what runs; drops what waits.
   ~WorkerPool();
   WorkerPool(const WorkerPool&) = delete;
   WorkerPool& operator=(const WorkerPool&) = delete;
 
   /// A call: takes a place and queues the work, or says when to come back. id: unique among those who hold places.
+  /// Refuses for want of memory where not even one thread can be started, as openStream() does.
   Decision submit(std::uint64_t id, const Caller& caller, std::size_t bytes, Work work);
   /// A stream: takes a place, or says when to come back.
   Decision openStream(std::uint64_t id, const Caller& caller);
@@ -48,11 +52,18 @@ class WorkerPool {
   void setAgeing(double seconds);
 
  private:
+  // Call these with the mutex held.
+  bool hire();
+  bool staffed() { return !threads_.empty() || hire(); }
+  void hireWhereWorkWaits();
+
   void serve();
 
+  const Around around_;
   mutable std::mutex mutex_;
   std::condition_variable wake_;
   RequestQueue queue_;
+  std::size_t idle_ = 0;  ///< threads that wait for work, are about to, or have been woken for it
   bool stopping_ = false;
   std::vector<std::thread> threads_;
 };

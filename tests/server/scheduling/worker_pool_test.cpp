@@ -118,3 +118,41 @@ TEST_CASE("who calls from a worker's own work finds the pool open") {
   });
   CHECK(done.get_future().wait_for(std::chrono::seconds(60)) == std::future_status::ready);
 }
+
+TEST_CASE("a pool starts a thread when work waits and none is free") {
+  std::atomic<int> started{0};
+  Blocker first, second;
+  WorkerPool pool(2, {}, [&](const auto& serve) {
+    ++started;
+    serve();
+  });
+  CHECK(started == 0);
+  pool.submit(1, ann, 0, first.work());
+  first.entered.get_future().wait();
+  CHECK(started == 1);
+  pool.submit(2, ann, 0, second.work());
+  second.entered.get_future().wait();
+  CHECK(started == 2);
+  std::promise<void> done;
+  pool.submit(3, ann, 0, [&] { done.set_value(); });  // no third: it waits
+  CHECK(pool.load().queue_length == 1);
+  first.release.set_value();
+  done.get_future().wait();
+  CHECK(started == 2);
+  second.release.set_value();
+}
+
+TEST_CASE("one after the other needs one thread") {
+  std::atomic<int> started{0};
+  WorkerPool pool(3, {}, [&](const auto& serve) {
+    ++started;
+    serve();
+  });
+  for (std::uint64_t i = 0; i < 20; ++i) {
+    std::promise<void> done;
+    pool.submit(i, ann, 0, [&] { done.set_value(); });
+    done.get_future().wait();
+    while (pool.load().busy > 0) std::this_thread::yield();  // the thread is free again
+  }
+  CHECK(started == 1);
+}
