@@ -62,7 +62,8 @@ class ModelStore::Publishing {
 };
 
 ModelStore::ModelStore(const std::filesystem::path& root, const ModelStoreOptions& options)
-    : directory_(root), options_(options), loaders_(options.loaders, noLimits(), {}) {
+    : directory_(root), options_(options), loaders_("loader", options.loaders, noLimits(), {}) {
+  loaders_.hireFirst();  // else a training, which gives way to all others, might be the one to start it
   for (const auto& name : directory_.models()) {
     table_.add({name, unsignedVersions(directory_.versions(name)).back()});
     for (const auto& [label, version] : directory_.labels(name))

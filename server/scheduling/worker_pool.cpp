@@ -1,5 +1,9 @@
 #include "server/scheduling/worker_pool.h"
 
+#include <pthread.h>
+#include <sys/resource.h>
+#include <unistd.h>
+
 #include <chrono>
 #include <system_error>
 
@@ -8,14 +12,16 @@ namespace {
 
 using Clock = std::chrono::steady_clock;
 
+int niceOfThisThread() { return getpriority(PRIO_PROCESS, static_cast<id_t>(gettid())); }
+
 Decision noThread() {
   return {false, RefusalCause::kMemory, "the system lets the daemon start no thread", std::chrono::seconds(1)};
 }
 
 }  // namespace
 
-WorkerPool::WorkerPool(int threads, AdmissionLimits limits, Around around)
-    : around_(std::move(around)), queue_(threads, limits) {
+WorkerPool::WorkerPool(std::string name, int threads, AdmissionLimits limits, Around around)
+    : name_(std::move(name)), around_(std::move(around)), nice_(niceOfThisThread()), queue_(threads, limits) {
   threads_.reserve(static_cast<std::size_t>(threads));
 }
 
@@ -31,7 +37,10 @@ WorkerPool::~WorkerPool() {
 /// One thread more; false where the system gives none, or the pool is about to end.
 bool WorkerPool::hire() try {
   if (stopping_) return false;
-  threads_.emplace_back([this] { around_ ? around_([this] { serve(); }) : serve(); });
+  threads_.emplace_back([this] {
+    pthread_setname_np(pthread_self(), name_.c_str());
+    around_ ? around_([this] { serve(); }) : serve();
+  });
   ++idle_;
   return true;
 } catch (const std::system_error&) {
@@ -41,7 +50,14 @@ bool WorkerPool::hire() try {
 /// Where there can be no thread more, those that are there work it off.
 void WorkerPool::hireWhereWorkWaits() {
   const auto load = queue_.load();
-  if (idle_ < load.queue_length && threads_.size() < static_cast<std::size_t>(load.workers)) hire();
+  if (idle_ < load.queue_length && threads_.size() < static_cast<std::size_t>(load.workers) &&
+      niceOfThisThread() <= nice_)
+    hire();
+}
+
+void WorkerPool::hireFirst() {
+  const std::scoped_lock lock(mutex_);
+  if (!staffed()) throw std::system_error(std::make_error_code(std::errc::resource_unavailable_try_again), name_);
 }
 
 Decision WorkerPool::submit(std::uint64_t id, const Caller& caller, std::size_t bytes, Work work) {

@@ -4,6 +4,7 @@
 #include <cstdint>
 #include <functional>
 #include <mutex>
+#include <string>
 #include <thread>
 #include <vector>
 
@@ -15,6 +16,7 @@ namespace shaped::server {
 ///
 /// A thread is started when work waits and none is free, up to the pool's number, and then stays: each takes a tenth of
 /// a megabyte (stack, and what libraries keep for every thread), which a daemon that has nothing to do need not hold.
+/// A thread inherits how nice it is from the one that starts it: who gives way to others starts none but the first.
 ///
 /// Work must not throw. What waits can be withdrawn by its id, which decides races: either withdraw() returns true and
 /// the work never runs, or a worker has taken it. Whoever was admitted holds a place until leave().
@@ -24,12 +26,16 @@ class WorkerPool {
   using Around = std::function<void(const std::function<void()>& serve)>;
   using Work = RequestQueue::Work;
 
-  /// threads: the most there may be, >= 1.
-  WorkerPool(int threads, AdmissionLimits limits, Around around);
+  /// name: of its threads, for top and debuggers, at most 15 characters. threads: the most there may be, >= 1.
+  WorkerPool(std::string name, int threads, AdmissionLimits limits, Around around);
   /// Finishes what runs; drops what waits.
   ~WorkerPool();
   WorkerPool(const WorkerPool&) = delete;
   WorkerPool& operator=(const WorkerPool&) = delete;
+
+  /// Starts the first thread now: for a pool that a thread which gives way to others (nice) may be the first to submit to.
+  /// Throws std::system_error where the system gives none.
+  void hireFirst();
 
   /// A call: takes a place and queues the work, or says when to come back. id: unique among those who hold places.
   /// Refuses for want of memory where not even one thread can be started, as openStream() does.
@@ -59,7 +65,9 @@ class WorkerPool {
 
   void serve();
 
+  const std::string name_;
   const Around around_;
+  const int nice_;  ///< of the thread that made the pool
   mutable std::mutex mutex_;
   std::condition_variable wake_;
   RequestQueue queue_;

@@ -1,5 +1,8 @@
 #include "server/scheduling/worker_pool.h"
 
+#include <sys/resource.h>
+#include <unistd.h>
+
 #include <atomic>
 #include <catch2/catch.hpp>
 #include <future>
@@ -27,7 +30,7 @@ struct Blocker {
 TEST_CASE("work runs in the order of its arrival") {
   std::vector<int> order;
   {
-    WorkerPool pool(1, {}, {});
+    WorkerPool pool("test", 1, {}, {});
     std::promise<void> done;
     for (int i = 0; i < 5; ++i) pool.submit(static_cast<std::uint64_t>(i), ann, 1, [&, i] { order.push_back(i); });
     pool.submit(5, ann, 1, [&] { done.set_value(); });
@@ -39,7 +42,7 @@ TEST_CASE("work runs in the order of its arrival") {
 TEST_CASE("every worker lives inside its surroundings") {
   std::atomic<int> prepared{0}, seen{0};
   {
-    WorkerPool pool(1, {}, [&](const auto& serve) {
+    WorkerPool pool("test", 1, {}, [&](const auto& serve) {
       ++prepared;
       serve();
       prepared = -1;
@@ -57,7 +60,7 @@ TEST_CASE("every worker lives inside its surroundings") {
 
 TEST_CASE("a full queue refuses, and withdrawing makes room") {
   Blocker blocker;
-  WorkerPool pool(1, {.queue_length = 2, .bytes_in_flight = 110}, {});
+  WorkerPool pool("test", 1, {.queue_length = 2, .bytes_in_flight = 110}, {});
   REQUIRE(pool.submit(1, ann, 10, blocker.work()).admitted);
   blocker.entered.get_future().wait();
   std::atomic<int> ran{0};
@@ -81,7 +84,7 @@ TEST_CASE("a full queue refuses, and withdrawing makes room") {
 
 TEST_CASE("withdrawn work is destroyed outside the pool's lock") {
   Blocker blocker;
-  WorkerPool pool(1, {}, {});
+  WorkerPool pool("test", 1, {}, {});
   pool.submit(1, ann, 0, blocker.work());
   blocker.entered.get_future().wait();
   std::size_t left = 99;
@@ -97,7 +100,7 @@ TEST_CASE("withdrawn work is destroyed outside the pool's lock") {
 }
 
 TEST_CASE("streams hold places until they leave") {
-  WorkerPool pool(1, {.queue_length = 1, .bytes_in_flight = 1, .open_streams = 1}, {});
+  WorkerPool pool("test", 1, {.queue_length = 1, .bytes_in_flight = 1, .open_streams = 1}, {});
   CHECK(pool.openStream(1, ann).admitted);
   CHECK_FALSE(pool.openStream(2, ann).admitted);
   std::promise<void> done;
@@ -110,7 +113,7 @@ TEST_CASE("streams hold places until they leave") {
 }
 
 TEST_CASE("who calls from a worker's own work finds the pool open") {
-  WorkerPool pool(1, {}, {});
+  WorkerPool pool("test", 1, {}, {});
   std::promise<void> done;
   pool.submit(1, ann, 0, [&] {
     pool.leave(1);
@@ -122,7 +125,7 @@ TEST_CASE("who calls from a worker's own work finds the pool open") {
 TEST_CASE("a pool starts a thread when work waits and none is free") {
   std::atomic<int> started{0};
   Blocker first, second;
-  WorkerPool pool(2, {}, [&](const auto& serve) {
+  WorkerPool pool("test", 2, {}, [&](const auto& serve) {
     ++started;
     serve();
   });
@@ -144,7 +147,7 @@ TEST_CASE("a pool starts a thread when work waits and none is free") {
 
 TEST_CASE("one after the other needs one thread") {
   std::atomic<int> started{0};
-  WorkerPool pool(3, {}, [&](const auto& serve) {
+  WorkerPool pool("test", 3, {}, [&](const auto& serve) {
     ++started;
     serve();
   });
@@ -155,4 +158,29 @@ TEST_CASE("one after the other needs one thread") {
     while (pool.load().busy > 0) std::this_thread::yield();  // the thread is free again
   }
   CHECK(started == 1);
+}
+
+TEST_CASE("who gives way to others starts the first thread at most") {
+  std::atomic<int> started{0};
+  Blocker first;
+  WorkerPool pool("test", 2, {}, [&](const auto& serve) {
+    ++started;
+    serve();
+  });
+  pool.hireFirst();
+  pool.submit(1, ann, 0, first.work());
+  first.entered.get_future().wait();
+  const auto submitFrom = [&](int nice, std::uint64_t id, std::function<void()> work) {
+    std::thread([&pool, nice, id, work = std::move(work)] {
+      setpriority(PRIO_PROCESS, static_cast<id_t>(gettid()), nice);
+      pool.submit(id, ann, 0, work);
+    }).join();
+  };
+  submitFrom(getpriority(PRIO_PROCESS, 0) + 1, 2, [] {});
+  CHECK(started == 1);
+  std::promise<void> done;
+  submitFrom(getpriority(PRIO_PROCESS, 0), 3, [&] { done.set_value(); });
+  CHECK(done.get_future().wait_for(std::chrono::seconds(60)) == std::future_status::ready);
+  CHECK(started == 2);
+  first.release.set_value();
 }
