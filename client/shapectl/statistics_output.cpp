@@ -173,6 +173,7 @@ nlohmann::json toJson(const Statistics& statistics) {
                           {"pools", nlohmann::json::array()},
                           {"models", nlohmann::json::array()},
                           {"refusals", nlohmann::json::object()},
+                          {"denials", nlohmann::json::object()},
                           {"jobs", nlohmann::json::object()}};
   for (const auto& method : statistics.methods()) document["methods"].push_back(toJson(method));
   for (const auto& pool : statistics.pools()) document["pools"].push_back(toJson(pool));
@@ -182,6 +183,7 @@ nlohmann::json toJson(const Statistics& statistics) {
     document["models"].push_back(entry);
   }
   for (const auto& refusal : statistics.refusals()) document["refusals"][refusal.cause()] = refusal.count();
+  for (const auto& denial : statistics.denials()) document["denials"][denial.code()] = denial.count();
   for (const auto& job : statistics.jobs()) document["jobs"][job.state()] = job.count();
   return document;
 }
@@ -190,6 +192,8 @@ std::vector<std::string> screenOf(const Statistics& now, const Statistics* befor
   std::vector<std::string> lines{headLine(now, before, server)};
   for (const auto& pool : now.pools()) lines.push_back(poolLine(pool));
   lines.push_back("refusals " + countsText(now.refusals(), [](const auto& entry) { return entry.cause(); }));
+  if (now.denials_size() > 0)
+    lines.push_back("denials  " + countsText(now.denials(), [](const auto& entry) { return entry.code(); }));
   lines.push_back("jobs     " + countsText(now.jobs(), [](const auto& entry) { return entry.state(); }));
   lines.push_back(modelsLine(now));
   if (now.lost_log_lines() > 0) lines.push_back("log      " + std::to_string(now.lost_log_lines()) + " lines lost");

@@ -61,6 +61,11 @@ void toProto(const Surroundings& surroundings, v1::GetStatisticsResponse& respon
     entry.mutable_model()->set_version(model.version);
     entry.set_bytes(model.bytes);
   }
+  for (const auto& [code, count] : surroundings.denials) {
+    auto& entry = *response.add_denials();
+    entry.set_code(code);
+    entry.set_count(count);
+  }
   for (const auto& [state, count] : surroundings.jobs) {
     auto& entry = *response.add_jobs();
     entry.set_state(state);

@@ -106,7 +106,8 @@ void Daemon::setServing(bool serving) {
 Surroundings Daemon::surroundings() {
   return {{poolStatistics("solver", pool_), poolStatistics("light", light_), poolStatistics("heavy", heavy_)},
           modelMemory(models_),
-          jobCounts(job_registry_)};
+          jobCounts(job_registry_),
+          denialCounts(security_.access())};
 }
 
 void Daemon::listen(const std::string& address) {

@@ -2,6 +2,8 @@
 
 #include <google/protobuf/descriptor.h>
 
+#include "server/errors/status.h"
+
 namespace shaped::server {
 
 PoolStatistics poolStatistics(const std::string& name, const WorkerPool& pool) {
@@ -21,6 +23,13 @@ std::map<std::string, std::uint64_t> jobCounts(const JobRegistry& registry) {
     counts[nameOf(state)] = 0;
   for (const auto& record : registry.list({.states = {}, .after = {}, .limit = 100'000}))
     ++counts[nameOf(record.state)];
+  return counts;
+}
+
+std::map<std::string, std::uint64_t> denialCounts(const Access* access) {
+  std::map<std::string, std::uint64_t> counts;
+  if (!access) return counts;
+  for (const auto& [code, count] : access->denials()) counts[nameOf(code)] = count;
   return counts;
 }
 

@@ -32,6 +32,11 @@ class WrongState : public std::runtime_error {
   using std::runtime_error::runtime_error;
 };
 
+/// The caller's roles do not go so far.
+class NotAllowed : public std::runtime_error {
+  using std::runtime_error::runtime_error;
+};
+
 /// A model does not fit into the memory budget.
 class OverBudget : public std::runtime_error {
  public:

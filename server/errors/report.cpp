@@ -9,11 +9,11 @@
 namespace shaped::server {
 namespace {
 
-constexpr std::array kNames{"INVALID_FIELD",  "MODEL_NOT_FOUND", "NOT_FOUND",    "ALREADY_EXISTS",    "WRONG_STATE",
-                            "SERVER_BUSY",    "BYTES_IN_FLIGHT", "OPEN_STREAMS", "CLIENT_REQUESTS",   "CLIENT_BYTES",
-                            "CLIENT_STREAMS", "TOO_MANY_JOBS",   "STORE_LOCKED", "MEMORY_BUDGET",     "DISK_FULL",
-                            "OUT_OF_MEMORY",  "DATA_DAMAGED",    "FILE_FAILURE", "DEADLINE_EXCEEDED", "CANCELLED",
-                            "INTERNAL"};
+constexpr std::array kNames{"INVALID_FIELD",     "MODEL_NOT_FOUND", "NOT_FOUND",    "ALREADY_EXISTS",  "WRONG_STATE",
+                            "SERVER_BUSY",       "BYTES_IN_FLIGHT", "OPEN_STREAMS", "CLIENT_REQUESTS", "CLIENT_BYTES",
+                            "CLIENT_STREAMS",    "TOO_MANY_JOBS",   "STORE_LOCKED", "MEMORY_BUDGET",   "DISK_FULL",
+                            "OUT_OF_MEMORY",     "DATA_DAMAGED",    "FILE_FAILURE", "STORE_READ_ONLY", "NOT_ALLOWED",
+                            "DEADLINE_EXCEEDED", "CANCELLED",       "INTERNAL"};
 static_assert(kNames.size() == static_cast<std::size_t>(Reason::kInternal) + 1);
 
 /// Text that a protobuf field may hold: what is no UTF-8 is replaced.

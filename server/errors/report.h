@@ -31,6 +31,8 @@ enum class Reason {
   kOutOfMemory,       ///< no memory for this request
   kDataDamaged,       ///< a file of the store does not hold what was written to it
   kFileFailure,       ///< the store cannot be read or written
+  kStoreReadOnly,     ///< the store's disk, or its files, may not be written to
+  kNotAllowed,        ///< the caller's roles do not go so far
   kDeadlineExceeded,  ///< the client's deadline or the server's cap passed
   kCancelled,         ///< the client cancelled or went away
   kInternal,          ///< a defect of the server

@@ -1,5 +1,6 @@
 #include "server/errors/status.h"
 
+#include <algorithm>
 #include <new>
 #include <system_error>
 
@@ -24,9 +25,20 @@ ErrorReport stoppedReport(StopReason reason) {
   return {grpc::CANCELLED, text, Reason::kCancelled, {}, {}};
 }
 
+// What server/jobs/sqlite.cpp says; the database's library gives no number of the system's.
+constexpr const char* kReadOnlyDatabase = "the file or its file system is read-only";
+
+bool saysOneOf(std::initializer_list<int> reasons, const std::string& text) {
+  return std::any_of(reasons.begin(), reasons.end(), [&](int reason) {
+    return text.find(std::generic_category().message(reason)) != std::string::npos;
+  });
+}
+
 ErrorReport fileReport(const std::string& text) {
   if (saysDiskFull(text))
     return {grpc::RESOURCE_EXHAUSTED, text + "; free space in the store and try again", Reason::kDiskFull, {}, {}};
+  if (saysReadOnly(text))
+    return {grpc::UNAVAILABLE, text + "; its operator must make it writable", Reason::kStoreReadOnly, {}, kBusyDelay};
   return {grpc::INTERNAL, text, Reason::kFileFailure, {}, {}};
 }
 
@@ -49,6 +61,8 @@ ErrorReport reportOf(const std::exception_ptr& error, StopReason stopped) {
     return {grpc::UNAVAILABLE, problem.what(), Reason::kStoreLocked, {}, kBusyDelay};
   } catch (const WrongState& problem) {
     return {grpc::FAILED_PRECONDITION, problem.what(), Reason::kWrongState, {}, {}};
+  } catch (const NotAllowed& problem) {
+    return {grpc::PERMISSION_DENIED, problem.what(), Reason::kNotAllowed, {}, {}};
   } catch (const OverBudget& problem) {
     ErrorReport report{grpc::RESOURCE_EXHAUSTED, problem.what(), Reason::kMemoryBudget, {}, {}};
     if (problem.mayPass()) report.retry_after = std::chrono::seconds(1);
@@ -70,10 +84,10 @@ ErrorReport reportOf(const std::exception_ptr& error, StopReason stopped) {
 
 }  // namespace
 
-bool saysDiskFull(const std::string& text) {
-  for (const int reason : {ENOSPC, EDQUOT, EFBIG})
-    if (text.find(std::generic_category().message(reason)) != std::string::npos) return true;
-  return false;
+bool saysDiskFull(const std::string& text) { return saysOneOf({ENOSPC, EDQUOT, EFBIG}, text); }
+
+bool saysReadOnly(const std::string& text) {
+  return saysOneOf({EROFS, EACCES, EPERM}, text) || text.find(kReadOnlyDatabase) != std::string::npos;
 }
 
 grpc::Status statusOf(const std::exception_ptr& error, StopReason stopped) {

@@ -21,8 +21,9 @@ namespace shaped::server {
 ///   StoreLocked -> UNAVAILABLE
 ///   Corrupted -> DATA_LOSS
 ///   Stopped -> see stoppedStatus
-///   FileError, std::system_error -> RESOURCE_EXHAUSTED when the disk is full, else INTERNAL
-///   anything else -> INTERNAL
+///   NotAllowed -> PERMISSION_DENIED
+///   FileError, std::system_error -> RESOURCE_EXHAUSTED when the disk is full, UNAVAILABLE when it may not be written
+///   to, else INTERNAL anything else -> INTERNAL
 grpc::Status statusOf(const std::exception_ptr& error, StopReason stopped);
 
 /// The client went away or reads nothing: CANCELLED; time is up: DEADLINE_EXCEEDED.
@@ -33,6 +34,9 @@ std::optional<RefusalCause> refusalCauseOf(const std::exception_ptr& error);
 
 /// Whether a FileError's text gives a full disk, quota or size limit as the system's reason.
 bool saysDiskFull(const std::string& text);
+
+/// Whether it gives a disk or a file that may not be written to.
+bool saysReadOnly(const std::string& text);
 
 /// "INVALID_ARGUMENT" and so on.
 std::string nameOf(grpc::StatusCode code);

@@ -26,6 +26,10 @@ std::string nameOfCaller(const Access* access, const grpc::CallbackServerContext
   return access ? access->nameOf(credentialsOf(context)) : "";
 }
 
+bool callerHolds(const Access* access, const grpc::CallbackServerContext& context, Role role) {
+  return !access || access->holds(credentialsOf(context), role);
+}
+
 std::string hostOf(std::string_view peer) {
   const bool by_port = peer.starts_with("ipv4:") || peer.starts_with("ipv6:");
   return std::string(by_port ? peer.substr(0, peer.rfind(':')) : peer);

@@ -18,6 +18,9 @@ inline constexpr char kPriorityKey[] = "shaped-priority";
 /// access: null where nobody is asked.
 std::string nameOfCaller(const Access* access, const grpc::CallbackServerContext& context);
 
+/// Whether he may do what needs this role; everybody may where nobody is asked.
+bool callerHolds(const Access* access, const grpc::CallbackServerContext& context, Role role);
+
 /// Where a connection comes from without what changes from one to the next: "ipv4:10.0.0.7:53012" is "ipv4:10.0.0.7".
 std::string hostOf(std::string_view peer);
 

@@ -5,6 +5,7 @@
 #include "server/convert/job.h"
 #include "server/errors/errors.h"
 #include "server/jobs/record_file.h"
+#include "server/rpc/caller.h"
 #include "server/rpc/evaluate.h"
 #include "server/rpc/marker_job.h"
 #include "server/rpc/outgoing_stream_call.h"
@@ -31,6 +32,12 @@ void list(const JobRegistry& registry, const v1::ListJobsRequest& request, v1::L
     response.set_next_page_token(records.back().id);
   }
   for (const auto& record : records) toProto(record, *response.add_jobs());
+}
+
+/// Who may start jobs that only answer may cancel and delete these, too; trainings are for those who train.
+void requireMayEnd(const Access* access, const grpc::CallbackServerContext& context, const JobRecord& job) {
+  if (job.kind != kTrainShellPga || callerHolds(access, context, Role::kTrain)) return;
+  throw NotAllowed("job " + job.id + " is a training: cancelling or deleting it needs the role \"train\"");
 }
 
 using ResultCall = OutgoingStreamCall<v1::GetJobResultRequest, v1::GetJobResultResponse>;
@@ -116,7 +123,10 @@ grpc::ServerUnaryReactor* JobsService::Cancel(grpc::CallbackServerContext* conte
                                               v1::CancelJobResponse* response) {
   return startUnary<v1::CancelJobRequest, v1::CancelJobResponse>(
       runtime_, runtime_.light, "Jobs.Cancel", context, request, response,
-      [this](const auto& wanted, auto& answer, Call&) { toProto(runner_.cancel(wanted.id()), *answer.mutable_job()); });
+      [this, context](const auto& wanted, auto& answer, Call&) {
+        requireMayEnd(runtime_.access, *context, registry_.get(wanted.id()));
+        toProto(runner_.cancel(wanted.id()), *answer.mutable_job());
+      });
 }
 
 grpc::ServerUnaryReactor* JobsService::Wait(grpc::CallbackServerContext* context, const v1::WaitJobRequest* request,
@@ -130,7 +140,10 @@ grpc::ServerUnaryReactor* JobsService::Delete(grpc::CallbackServerContext* conte
                                               v1::DeleteJobResponse* response) {
   return startUnary<v1::DeleteJobRequest, v1::DeleteJobResponse>(
       runtime_, runtime_.light, "Jobs.Delete", context, request, response,
-      [this](const auto& wanted, auto&, Call&) { runner_.forget(wanted.id()); });
+      [this, context](const auto& wanted, auto&, Call&) {
+        requireMayEnd(runtime_.access, *context, registry_.get(wanted.id()));
+        runner_.forget(wanted.id());
+      });
 }
 
 }  // namespace shaped::server

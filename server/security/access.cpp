@@ -53,6 +53,13 @@ std::optional<Client> Access::clientOf(const Credentials& credentials) const {
 }
 
 grpc::Status Access::judge(std::string_view method, const Credentials& credentials) const {
+  auto status = verdict(method, credentials);
+  if (status.error_code() == grpc::UNAUTHENTICATED) ++unauthenticated_;
+  if (status.error_code() == grpc::PERMISSION_DENIED) ++denied_;
+  return status;
+}
+
+grpc::Status Access::verdict(std::string_view method, const Credentials& credentials) const {
   using Who = Requirement::Who;
   const auto requirement = requirementOf(method);
   if (requirement.who == Who::kEverybody) return grpc::Status::OK;
@@ -61,9 +68,22 @@ grpc::Status Access::judge(std::string_view method, const Credentials& credentia
   if (requirement.who == Who::kClients) return grpc::Status::OK;
   if (requirement.who == Who::kNobody)
     return {grpc::PERMISSION_DENIED, shortName(method) + " is no method that a role allows"};
-  if (client->roles.holds(requirement.role)) return grpc::Status::OK;
-  return {grpc::PERMISSION_DENIED, shortName(method) + " needs the role \"" + server::nameOf(requirement.role) +
-                                       "\", which \"" + client->name + "\" does not have; ask the operator for it"};
+  std::string wanted;
+  for (const auto role : requirement.roles) {
+    if (client->roles.holds(role)) return grpc::Status::OK;
+    wanted += (wanted.empty() ? "\"" : " or \"") + server::nameOf(role) + "\"";
+  }
+  return {grpc::PERMISSION_DENIED, shortName(method) + " needs the role " + wanted + ", which \"" + client->name +
+                                       "\" does not have; ask the operator for it"};
+}
+
+bool Access::holds(const Credentials& credentials, Role role) const {
+  const auto client = clientOf(credentials);
+  return client && client->roles.holds(role);
+}
+
+std::map<grpc::StatusCode, std::uint64_t> Access::denials() const {
+  return {{grpc::UNAUTHENTICATED, unauthenticated_}, {grpc::PERMISSION_DENIED, denied_}};
 }
 
 std::string Access::nameOf(const Credentials& credentials) const {

@@ -3,6 +3,7 @@
 #include <optional>
 #include <string>
 #include <string_view>
+#include <vector>
 
 namespace shaped::server {
 
@@ -31,11 +32,11 @@ struct Requirement {
   enum class Who {
     kEverybody,  ///< also without token and certificate
     kClients,    ///< whoever is known, whatever the roles
-    kRole,       ///< who holds `role`
+    kRole,       ///< who holds one of `roles`
     kNobody,     ///< a method without an entry in the table
   };
   Who who = Who::kNobody;
-  Role role = Role::kAdmin;
+  std::vector<Role> roles = {};
 };
 
 /// The one table of methods and roles. method: "/shaped.v1.Models/List", as the wire has it.

@@ -126,7 +126,9 @@ void addStores(const Statistics& statistics, Families& families) {
   auto ended = counter("shaped_jobs_ended_total", "Jobs that have ended, by kind and how");
   for (const auto& [job, count] : statistics.ended_jobs)
     ended.add({{"kind", job.kind}, {"state", job.state}}, number(count));
-  for (auto* family : {&refusals, &models, &jobs, &ended}) families.push_back(family->take());
+  auto denials = counter("shaped_denials_total", "Calls turned away for who makes them, by gRPC status");
+  for (const auto& [code, count] : statistics.surroundings.denials) denials.add({{"code", code}}, number(count));
+  for (auto* family : {&refusals, &models, &jobs, &ended, &denials}) families.push_back(family->take());
 }
 
 void addProcess(const Statistics& statistics, Families& families) {

@@ -50,8 +50,9 @@ struct ModelMemory {
 /// What others know: the telemetry asks for it and depends on none of them.
 struct Surroundings {
   std::vector<PoolStatistics> pools;
-  std::vector<ModelMemory> models;            ///< in memory
-  std::map<std::string, std::uint64_t> jobs;  ///< records kept, by state
+  std::vector<ModelMemory> models;                    ///< in memory
+  std::map<std::string, std::uint64_t> jobs;          ///< records kept, by state
+  std::map<std::string, std::uint64_t> denials = {};  ///< calls turned away for who makes them, by gRPC status name
 };
 
 /// How jobs of one kind ended: "succeeded", "failed", "cancelled".

@@ -252,6 +252,7 @@ class Tokens(SecurityCase):
                 run(role, SUCCESS, "models")
             run("read", DENIED, *project), run("train", DENIED, *project)
             run("infer", SUCCESS, *project), run("admin", SUCCESS, *project)
+            self.assert_each_ends_what_he_may_start(run, train)
             for role in ("read", "infer", "train"):
                 denied = run(role, DENIED, "delete", "tubes")
                 self.assertIn(f'Models.Delete needs the role "admin", which "{role}er"', denied.message())
@@ -260,6 +261,17 @@ class Tokens(SecurityCase):
         self.assertIn("method=Models.Delete client=adminer", self.log)
         for token in self.tokens.values():
             self.assertNotIn(token, self.log)
+
+    def assert_each_ends_what_he_may_start(self, run, train):
+        training = run("train", SUCCESS, *train, "--detach").json["id"]
+        answering = run("infer", SUCCESS, "evaluate", "tubes", "--detach").json["id"]
+        run("read", DENIED, "cancel", answering), run("infer", SUCCESS, "cancel", answering)
+        denied = run("infer", DENIED, "cancel", training).json["error"]
+        self.assertEqual(denied["reason"], "NOT_ALLOWED")
+        run("train", SUCCESS, "cancel", training), run("admin", SUCCESS, "cancel", training)
+        counted = run("admin", SUCCESS, "top", "--once").json["denials"]
+        self.assertEqual(counted["UNAUTHENTICATED"], 0)
+        self.assertGreaterEqual(counted["PERMISSION_DENIED"], 5)
 
     def test_unknown_and_expired_tokens_are_refused_alike(self):
         with self.daemon("--tokens", self.file) as address:

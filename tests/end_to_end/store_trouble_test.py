@@ -97,8 +97,8 @@ class ReadOnly(StoreCase):
         self.expect(SUCCESS, "download", "tubes", self.folder / "again")
         for words in (self.train("new"), ("upload", "new", self.folder / "copy"), ("label", "tubes@1", "stable"), ("delete", "tubes@1"),
                       ("evaluate", "tubes", "--detach")):
-            refused = self.expect(INTERNAL, *words).json["error"]
-            self.assertEqual(refused["reason"], "FILE_FAILURE", refused)
+            refused = self.expect(UNAVAILABLE, *words).json["error"]
+            self.assertEqual(refused["reason"], "STORE_READ_ONLY", refused)
             self.assertRegex(refused["message"], f"(?i){READ_ONLY}|is read-only", words)
         self.assertEqual(sorted(self.names()), ["later", "tubes"])
         self.daemon.wait_for(f"the end of job {running} cannot be recorded, trying again", PATIENCE)

@@ -87,6 +87,11 @@ TEST_CASE("calls are judged by token and role") {
         access.judge(kList, {"Bearer x", {}}).error_message());
   const auto denied = access.judge(kProject, {"Bearer one", {}}).error_message();
   CHECK_THAT(denied, Contains("Shapes.Project") && Contains("\"infer\"") && Contains("\"reader\""));
+  CHECK(access.denials() ==
+        std::map<grpc::StatusCode, std::uint64_t>{{grpc::UNAUTHENTICATED, 11}, {grpc::PERMISSION_DENIED, 3}});
+  CHECK(access.holds({"Bearer one", {}}, Role::kRead));
+  CHECK_FALSE(access.holds({"Bearer one", {}}, Role::kTrain));
+  CHECK_FALSE(access.holds({"Bearer x", {}}, Role::kRead));
   CHECK(access.nameOf({"Bearer one", {}}) == "reader");
   CHECK(access.nameOf({"Bearer x", {}}).empty());
 }

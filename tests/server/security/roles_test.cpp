@@ -39,16 +39,16 @@ TEST_CASE("every method of every service has its role") {
 }
 
 TEST_CASE("the roles of methods") {
-  CHECK(requirementOf("/shaped.v1.Models/Get").role == Role::kRead);
-  CHECK(requirementOf("/shaped.v1.Models/Delete").role == Role::kAdmin);
-  CHECK(requirementOf("/shaped.v1.Models/Download").role == Role::kInfer);
-  CHECK(requirementOf("/shaped.v1.Models/Upload").role == Role::kAdmin);
-  CHECK(requirementOf("/shaped.v1.Datasets/Upload").role == Role::kTrain);
-  CHECK(requirementOf("/shaped.v1.Jobs/Watch").role == Role::kRead);
-  CHECK(requirementOf("/shaped.v1.Jobs/Cancel").role == Role::kTrain);
-  CHECK(requirementOf("/shaped.v1.Jobs/FitMarkers").role == Role::kInfer);
-  CHECK(requirementOf("/shaped.v1.Jobs/GetResult").role == Role::kInfer);
-  CHECK(requirementOf("/shaped.v1.Shapes/FitMarkers").role == Role::kInfer);
+  CHECK(requirementOf("/shaped.v1.Models/Get").roles == std::vector{Role::kRead});
+  CHECK(requirementOf("/shaped.v1.Models/Delete").roles == std::vector{Role::kAdmin});
+  CHECK(requirementOf("/shaped.v1.Models/Download").roles == std::vector{Role::kInfer});
+  CHECK(requirementOf("/shaped.v1.Models/Upload").roles == std::vector{Role::kAdmin});
+  CHECK(requirementOf("/shaped.v1.Datasets/Upload").roles == std::vector{Role::kTrain});
+  CHECK(requirementOf("/shaped.v1.Jobs/Watch").roles == std::vector{Role::kRead});
+  CHECK(requirementOf("/shaped.v1.Jobs/Cancel").roles == std::vector{Role::kTrain, Role::kInfer});
+  CHECK(requirementOf("/shaped.v1.Jobs/FitMarkers").roles == std::vector{Role::kInfer});
+  CHECK(requirementOf("/shaped.v1.Jobs/GetResult").roles == std::vector{Role::kInfer});
+  CHECK(requirementOf("/shaped.v1.Shapes/FitMarkers").roles == std::vector{Role::kInfer});
   CHECK(requirementOf("/grpc.health.v1.Health/Check").who == Who::kEverybody);
   CHECK(requirementOf("/grpc.reflection.v1alpha.ServerReflection/ServerReflectionInfo").who == Who::kClients);
 }
