@@ -4,6 +4,7 @@
 #include <unistd.h>
 
 #include <algorithm>
+#include <future>
 
 #include "core/io/file.h"
 #include "core/io/file_error.h"
@@ -141,13 +142,17 @@ std::shared_ptr<const TensorFile> mapTensors(const fs::path& path, const ModelMa
   return tensors;
 }
 
-/// Maps the tensors and compares them with what the manifest says of them.
-std::shared_ptr<const TensorFile> readTensors(const fs::path& path, const ModelManifest& manifest) {
-  auto tensors = mapTensors(path, manifest);
-  if (const auto hash = sha256(tensors->bytes()); hash != manifest.tensors_sha256)
+/// Compares all bytes of the tensors with what the manifest says of them.
+void requireHash(const fs::path& path, const ModelManifest& manifest, const TensorFile& tensors) {
+  Sha256 hashing;
+  try {
+    tensors.readThrough([&](std::string_view piece) { hashing.update(piece); });
+  } catch (const InvalidInput& problem) {
+    throw FileError(path.string(), std::string("is damaged: ") + problem.what());
+  }
+  if (const auto hash = hashing.finish(); hash != manifest.tensors_sha256)
     throw FileError(path.string(), "has SHA-256 " + hash + ", its manifest says " + manifest.tensors_sha256 +
                                        "; restore or remove this version");
-  return tensors;
 }
 
 /// Removes what crashed publishers and removers left in a model's folder, and the folder if nothing else is in it.
@@ -224,11 +229,28 @@ ModelManifest ModelDirectory::manifest(const std::string& model, std::optional<s
   return readManifest(folderOf(model, version) / kManifestFile);
 }
 
-StoredModel ModelDirectory::load(const std::string& model, std::optional<std::int64_t> version) const {
+StoredModel ModelDirectory::load(const std::string& model, std::optional<std::int64_t> version,
+                                 const std::function<void(const StoredModel&)>& meanwhile) const {
   const auto folder = folderOf(model, version);
+  const auto path = folder / kTensorsFile;
   auto manifest = readManifest(folder / kManifestFile);
-  auto tensors = readTensors(folder / kTensorsFile, manifest);
-  return {model, *version, std::move(manifest), std::move(tensors)};
+  auto tensors = mapTensors(path, manifest);
+  const StoredModel stored{model, *version, std::move(manifest), std::move(tensors)};
+  const auto verify = [&] { requireHash(path, stored.manifest, *stored.tensors); };
+  if (!meanwhile) {
+    verify();
+    return stored;
+  }
+  auto verified = std::async(std::launch::async, verify);
+  std::exception_ptr failure;
+  try {
+    meanwhile(stored);
+  } catch (...) {
+    failure = std::current_exception();
+  }
+  verified.get();  // first: of damaged files it says so, whatever else has come of that
+  if (failure) std::rethrow_exception(failure);
+  return stored;
 }
 
 ModelFiles ModelDirectory::files(const std::string& model, std::optional<std::int64_t> version) const {

@@ -2,6 +2,7 @@
 
 #include <cstdint>
 #include <filesystem>
+#include <functional>
 #include <map>
 #include <memory>
 #include <optional>
@@ -63,7 +64,11 @@ class ModelDirectory {
 
   /// The newest version, or the one asked for. Throws ModelNotFound; FileError when the files are damaged: the manifest
   /// is no manifest, or the tensor file has not the size and SHA-256 that it states.
-  StoredModel load(const std::string& model, std::optional<std::int64_t> version = {}) const;
+  /// meanwhile: is called with the files while another thread compares the SHA-256, so that one reading serves both;
+  /// what it makes of them is to be thrown away when load() throws. What it throws is thrown on if the files are what
+  /// they should be.
+  StoredModel load(const std::string& model, std::optional<std::int64_t> version = {},
+                   const std::function<void(const StoredModel&)>& meanwhile = {}) const;
   /// The manifest alone, without looking at the tensors. Throws as load().
   ModelManifest manifest(const std::string& model, std::optional<std::int64_t> version = {}) const;
 

@@ -27,6 +27,9 @@ static_assert(std::endian::native == std::endian::little, "tensors are used as t
 
 constexpr std::size_t kMostHeaderBytes = 100'000'000;
 constexpr const char* kMetadata = "__metadata__";
+constexpr std::size_t kPiece = std::size_t{2} << 20;   ///< of reading through a file; whole pages
+constexpr std::size_t kAhead = std::size_t{16} << 20;  ///< what the disk is asked for before it is wanted
+constexpr int kPopulateRead = 22;                      ///< MADV_POPULATE_READ, which older C libraries do not name
 
 struct TypeName {
   TensorType type;
@@ -171,6 +174,22 @@ void TensorFile::requireSeamless() const {
   }
   if (covered != data_.size())
     throw InvalidInput(file_, "has " + std::to_string(data_.size() - covered) + " bytes that belong to no tensor");
+}
+
+void TensorFile::readThrough(const std::function<void(std::string_view)>& sink) const {
+  const auto advise = [&](std::size_t begin, std::size_t size, int advice) {
+    const auto piece = begin < mapping_.size() ? mapping_.substr(begin, size) : std::string_view();
+    return piece.empty() || ::madvise(const_cast<char*>(piece.data()), piece.size(), advice) == 0;
+  };
+  advise(0, kAhead, MADV_WILLNEED);
+  for (std::size_t begin = 0; begin < mapping_.size(); begin += kPiece) {
+    advise(begin + kAhead, kPiece, MADV_WILLNEED);
+    // Maps the pages of the piece at once; that a disk fails or the file was cut is an error here, not a signal.
+    // Kernels before 5.14 do not know it and map page by page.
+    if (!advise(begin, kPiece, kPopulateRead) && errno == EFAULT)
+      throw InvalidInput(file_, "cannot be read from the disk at byte " + std::to_string(begin));
+    sink(mapping_.substr(begin, kPiece));
+  }
 }
 
 std::vector<std::string> TensorFile::names() const {

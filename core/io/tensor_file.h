@@ -84,6 +84,9 @@ class TensorFile {
   const std::map<std::string, std::string>& metadata() const { return metadata_; }
   /// The whole file.
   std::string_view bytes() const { return mapping_; }
+  /// Gives the whole file to a sink, piece by piece, and has the disk read ahead meanwhile. Afterwards it is in memory
+  /// if there is room. Throws InvalidInput when the disk cannot read it.
+  void readThrough(const std::function<void(std::string_view)>& sink) const;
 
  private:
   struct Tensor {

@@ -80,16 +80,26 @@ SparseRows sparseFrom(const TensorFile& tensors, const std::string& name, Eigen:
   return matrix;
 }
 
-/// All variations below each other, 2J C x 3.
-Vertices stack(const std::vector<Vertices>& shapes) {
-  const auto rows = shapes.front().rows();
-  Vertices stacked(rows * static_cast<Eigen::Index>(shapes.size()), 3);
-  for (std::size_t j = 0; j < shapes.size(); ++j)
-    stacked.middleRows(static_cast<Eigen::Index>(j) * rows, rows) = shapes[j];
-  return stacked;
+/// Some rows at a time: those of a large matrix lie so far apart that a column of all would take a cache line a number.
+Eigen::MatrixXd columnMajor(const Eigen::Map<const RowMajorMatrix<double>>& rows) {
+  constexpr Eigen::Index kRows = 64;
+  Eigen::MatrixXd matrix(rows.rows(), rows.cols());
+  for (Eigen::Index begin = 0; begin < rows.rows(); begin += kRows) {
+    const auto count = std::min(kRows, rows.rows() - begin);
+    matrix.middleRows(begin, count) = rows.middleRows(begin, count);
+  }
+  return matrix;
 }
 
-ShellPga pgaFrom(const TensorFile& tensors, int path_steps, Eigen::Index coarse_vertices) {
+/// `count` shapes below each other, as they lie in the file.
+ShapeStack shapesIn(const std::shared_ptr<const TensorFile>& file, const char* name, Eigen::Index count,
+                    Eigen::Index vertices) {
+  file->requireShape(name, {count * vertices, 3});
+  return {file, file->values<double>(name).data(), static_cast<std::size_t>(count), vertices, file->bytes().size()};
+}
+
+ShellPga pgaFrom(const std::shared_ptr<const TensorFile>& file, int path_steps, Eigen::Index coarse_vertices) {
+  const auto& tensors = *file;
   ShellPga pga;
   pga.mean = tensors.matrix<double>("mean", coarse_vertices, 3);
   const auto values = tensors.values<double>("eigenvalues");
@@ -97,14 +107,12 @@ ShellPga pgaFrom(const TensorFile& tensors, int path_steps, Eigen::Index coarse_
   // Before the eigenvectors: without eigenvalues they could have any number of columns in no bytes.
   if (pga.eigenvalues.size() < 1 || !pga.eigenvalues.allFinite())
     throw InvalidInput("eigenvalues", "are none or not finite");
-  pga.eigenvectors = tensors.matrix<double>("eigenvectors", pga.eigenvalues.size(), -1);
+  pga.eigenvectors = columnMajor(tensors.matrix<double>("eigenvectors", pga.eigenvalues.size(), -1));
   const auto modes = pga.eigenvectors.cols();
   if (modes < 1 || modes > pga.eigenvalues.size() || !pga.eigenvectors.allFinite())
     throw InvalidInput("eigenvectors", "are none, more than the eigenvalues or not finite");
   pga.path_steps = path_steps;
-  const auto stacked = tensors.matrix<double>("variations", 2 * modes * coarse_vertices, 3);
-  for (Eigen::Index j = 0; j < 2 * modes; ++j)
-    pga.variations.push_back(stacked.middleRows(j * coarse_vertices, coarse_vertices));
+  pga.variations = shapesIn(file, "variations", 2 * modes, coarse_vertices);
   return pga;
 }
 
@@ -118,11 +126,11 @@ double bendingFrom(const nlohmann::json& description) {
 void requireCoarseShapes(const Topology& coarse, const ShellPga& pga) {
   requireOneComponent(coarse, "coarse.faces");
   requireValidShape(coarse, pga.mean, "mean");
-  for (std::size_t j = 0; j < pga.variations.size(); ++j)
-    requireValidShape(coarse, pga.variations[j], "variations[" + std::to_string(j) + "]");
+  requireValidShapes(coarse, pga.variations, "variations");
 }
 
-ShellPgaParts partsFrom(const nlohmann::json& description, const TensorFile& tensors) {
+ShellPgaParts partsFrom(const nlohmann::json& description, const std::shared_ptr<const TensorFile>& file) {
+  const auto& tensors = *file;
   ShellPgaParts parts;
   parts.template_shape = tensors.matrix<double>("template", -1, 3);
   const auto vertex_count = parts.template_shape.rows();
@@ -141,7 +149,7 @@ ShellPgaParts partsFrom(const nlohmann::json& description, const TensorFile& ten
   parts.bending = bendingFrom(description);
   parts.symmetry = symmetryFrom(description);
   const auto path_steps = requireWholeNumber(description, "path_steps", 1, kMostPathSteps);
-  parts.pga = pgaFrom(tensors, static_cast<int>(path_steps), coarse_vertices);
+  parts.pga = pgaFrom(file, static_cast<int>(path_steps), coarse_vertices);
   requireCoarseShapes(*parts.coarsening.coarse, parts.pga);
   parts.training.shapes = countIn(description, "training_shapes", 0);
   parts.training.mean = outcomeFrom(description.at("training").at("mean"));
@@ -168,7 +176,9 @@ std::int64_t publishShellPga(const ModelDirectory& directory, const std::string&
       "eigenvalues", {parts.pga.eigenvalues.size()},
       std::span<const double>(parts.pga.eigenvalues.data(), static_cast<std::size_t>(parts.pga.eigenvalues.size())));
   tensors.addMatrix("eigenvectors", parts.pga.eigenvectors);
-  tensors.addMatrix("variations", stack(parts.pga.variations));
+  const auto variations = parts.pga.variations.stacked();
+  tensors.add("variations", {variations.rows(), 3},
+              std::span<const double>(variations.data(), static_cast<std::size_t>(variations.size())));
 
   ModelManifest manifest;
   manifest.kind = kShellPgaKind;
@@ -201,7 +211,7 @@ void requireShellPga(const ModelManifest& manifest) {
                                        "; train it again or use the daemon that wrote it");
 }
 
-ShellPgaModelPtr shellPgaFrom(const ModelManifest& manifest, const TensorFile& tensors) try {
+ShellPgaModelPtr shellPgaFrom(const ModelManifest& manifest, const std::shared_ptr<const TensorFile>& tensors) try {
   requireShellPga(manifest);
   auto model = std::make_shared<const ShellPgaModel>(partsFrom(manifest.description, tensors));
   if (!model->mean().allFinite()) throw InvalidInput("mean", "cannot be carried to full resolution");
@@ -211,7 +221,7 @@ ShellPgaModelPtr shellPgaFrom(const ModelManifest& manifest, const TensorFile& t
 }
 
 ShellPgaModelPtr loadShellPga(const StoredModel& stored) try {
-  return shellPgaFrom(stored.manifest, *stored.tensors);
+  return shellPgaFrom(stored.manifest, stored.tensors);
 } catch (const InvalidInput& problem) {
   throw FileError("model " + stored.name + " version " + std::to_string(stored.version),
                   std::string("cannot be used: ") + problem.what());

@@ -16,9 +16,9 @@ std::int64_t publishShellPga(const ModelDirectory& directory, const std::string&
 /// Throws InvalidInput naming "manifest" when the kind or format version is none that shellPgaFrom() reads.
 void requireShellPga(const ModelManifest& manifest);
 
-/// Builds the model out of its files. Throws InvalidInput when kind or format version is another, or tensors are missing,
-/// of the wrong shape, or make no valid mesh.
-ShellPgaModelPtr shellPgaFrom(const ModelManifest& manifest, const TensorFile& tensors);
+/// Builds the model out of its files; its variations stay in the mapped file and keep that alive. Throws InvalidInput
+/// when kind or format version is another, or tensors are missing, of the wrong shape, or make no valid mesh.
+ShellPgaModelPtr shellPgaFrom(const ModelManifest& manifest, const std::shared_ptr<const TensorFile>& tensors);
 
 /// Builds the model that a stored version holds. Throws FileError naming the version when the kind or format version is
 /// another, or tensors are missing, of the wrong shape, or make no valid mesh.

@@ -9,10 +9,10 @@
 namespace shaped {
 namespace {
 
-std::shared_ptr<const Submanifold> makeSubmanifold(const ShellPgaParts& parts) {
-  auto calculus = std::make_shared<GeodesicCalculus>(std::make_shared<ShellStructure>(parts.coarsening.coarse),
-                                                     PairEnergy(parts.bending, parts.symmetry));
-  return std::make_shared<Submanifold>(std::move(calculus), std::make_shared<ShellPga>(parts.pga));
+std::shared_ptr<const Submanifold> makeSubmanifold(const std::shared_ptr<const ShellPgaParts>& parts) {
+  auto calculus = std::make_shared<GeodesicCalculus>(std::make_shared<ShellStructure>(parts->coarsening.coarse),
+                                                     PairEnergy(parts->bending, parts->symmetry));
+  return std::make_shared<Submanifold>(std::move(calculus), std::shared_ptr<const ShellPga>(parts, &parts->pga));
 }
 
 /// The largest triangle around a coarse vertex: its frame is the steadiest.
@@ -28,10 +28,9 @@ std::int32_t largestFaceAt(const Faces& faces, const Vertices& shape, std::int32
   return best;
 }
 
-std::size_t numbersOf(const ShellPga& pga) {
-  auto numbers = pga.mean.size() + pga.eigenvalues.size() + pga.eigenvectors.size();
-  for (const auto& variation : pga.variations) numbers += variation.size();
-  return static_cast<std::size_t>(numbers);
+std::size_t bytesOf(const ShellPga& pga) {
+  const auto numbers = pga.mean.size() + pga.eigenvalues.size() + pga.eigenvectors.size();
+  return sizeof(double) * static_cast<std::size_t>(numbers) + pga.variations.bytes();
 }
 
 /// Each face with its edges and hinges, and the edges.
@@ -42,31 +41,31 @@ std::size_t bytesOf(const TopologyPtr& topology) {
 }  // namespace
 
 ShellPgaModel::ShellPgaModel(ShellPgaParts parts)
-    : parts_(std::move(parts)),
+    : parts_(std::make_shared<const ShellPgaParts>(std::move(parts))),
       submanifold_(makeSubmanifold(parts_)),
-      prolongation_(parts_.topology, parts_.coarsening, parts_.reference, parts_.detail),
-      mean_(prolongation_.prolongate(parts_.pga.mean)),
-      coarse_reference_(restrictTo(parts_.coarsening, parts_.reference)),
-      coarse_template_(restrictTo(parts_.coarsening, parts_.template_shape)) {}
+      prolongation_(std::make_shared<const Prolongation>(parts_->topology, parts_->coarsening, parts_->reference,
+                                                         parts_->detail)),
+      mean_(prolongation_->prolongate(parts_->pga.mean)),
+      coarse_reference_(restrictTo(parts_->coarsening, parts_->reference)),
+      coarse_template_(restrictTo(parts_->coarsening, parts_->template_shape)) {}
 
 std::size_t ShellPgaModel::bytes() const {
   std::size_t numbers = 0;
-  for (const auto* shape : {&parts_.template_shape, &parts_.reference, &mean_, &coarse_reference_, &coarse_template_})
+  for (const auto* shape : {&parts_->template_shape, &parts_->reference, &mean_, &coarse_reference_, &coarse_template_})
     numbers += static_cast<std::size_t>(shape->size());
-  numbers += 2 * numbersOf(parts_.pga);  // the submanifold has a copy
-  return numbers * sizeof(double) + bytesOf(parts_.topology) + bytesOf(parts_.coarsening.coarse) +
-         bytesOf(parts_.detail) + prolongation_.bytes() + submanifold_->bytes();
+  return numbers * sizeof(double) + bytesOf(parts_->pga) + bytesOf(parts_->topology) +
+         bytesOf(parts_->coarsening.coarse) + bytesOf(parts_->detail) + prolongation_->bytes() + submanifold_->bytes();
 }
 
 Vertices ShellPgaModel::restrict(const Vertices& shape, const std::string& field) const {
   requireValidShape(topology(), shape, field);
-  Vertices coarse = restrictTo(parts_.coarsening, shape);
-  requireValidShape(*parts_.coarsening.coarse, coarse, field + " on the model's coarse mesh");
+  Vertices coarse = restrictTo(parts_->coarsening, shape);
+  requireValidShape(*parts_->coarsening.coarse, coarse, field + " on the model's coarse mesh");
   return coarse;
 }
 
 Anchor ShellPgaModel::anchorOfPoint(const Eigen::Vector3d& point) const {
-  const auto& faces = parts_.coarsening.coarse->faces();
+  const auto& faces = parts_->coarsening.coarse->faces();
   const auto nearest = ClosestPointQuery(coarse_template_, faces)(point.transpose());
   return makeAnchor(faces, coarse_template_, nearest.face, Eigen::Vector3d(nearest.barycentric.transpose()), point);
 }
@@ -75,12 +74,12 @@ Anchor ShellPgaModel::anchorOfVertex(std::int32_t vertex, const std::string& fie
   if (vertex < 0 || vertex >= topology().vertexCount())
     throw InvalidInput(field, "vertex " + std::to_string(vertex) + " is outside [0, " +
                                   std::to_string(topology().vertexCount()) + ")");
-  const auto& kept = parts_.coarsening.kept;
+  const auto& kept = parts_->coarsening.kept;
   const auto at = std::lower_bound(kept.begin(), kept.end(), vertex);
-  if (at == kept.end() || *at != vertex) return anchorOfPoint(parts_.template_shape.row(vertex));
+  if (at == kept.end() || *at != vertex) return anchorOfPoint(parts_->template_shape.row(vertex));
   const auto coarse = static_cast<std::int32_t>(at - kept.begin());
   Anchor anchor;
-  const auto& faces = parts_.coarsening.coarse->faces();
+  const auto& faces = parts_->coarsening.coarse->faces();
   anchor.face = largestFaceAt(faces, coarse_template_, coarse);
   for (int c = 0; c < 3; ++c) anchor.barycentric[c] = faces(anchor.face, c) == coarse ? 1 : 0;
   return anchor;
@@ -88,7 +87,7 @@ Anchor ShellPgaModel::anchorOfVertex(std::int32_t vertex, const std::string& fie
 
 /// The surface point of an anchor, with what lies between it and the marker as an offset over the faces around.
 MarkerSite ShellPgaModel::siteAt(const Anchor& anchor, const Eigen::Vector3d& marker) const {
-  const auto& faces = parts_.coarsening.coarse->faces();
+  const auto& faces = parts_->coarsening.coarse->faces();
   MarkerSite site;
   site.skin = {anchor.face, anchor.barycentric, Eigen::Vector3d::Zero()};
   site.offset = marker - position(site.skin, faces, coarse_template_);
@@ -111,7 +110,7 @@ std::vector<MarkerSite> ShellPgaModel::sitesOf(const MarkerSet& markers) const {
     const std::string field = "markers[" + std::to_string(l) + "] (" + marker.label + ")";
     if (marker.vertex >= 0) {
       const Anchor anchor = anchorOfVertex(marker.vertex, field);
-      sites.push_back(siteAt(anchor, parts_.template_shape.row(marker.vertex).transpose() + marker.offset));
+      sites.push_back(siteAt(anchor, parts_->template_shape.row(marker.vertex).transpose() + marker.offset));
       continue;
     }
     if (marker.face < 0 || marker.face >= topology().faces().rows())
@@ -119,24 +118,28 @@ std::vector<MarkerSite> ShellPgaModel::sitesOf(const MarkerSet& markers) const {
                                     std::to_string(topology().faces().rows()) + ")");
     Eigen::Vector3d skin = Eigen::Vector3d::Zero();
     for (int c = 0; c < 3; ++c)
-      skin += marker.barycentric[c] * parts_.template_shape.row(topology().faces()(marker.face, c)).transpose();
+      skin += marker.barycentric[c] * parts_->template_shape.row(topology().faces()(marker.face, c)).transpose();
     sites.push_back(siteAt(anchorOfPoint(skin), skin + marker.offset));
   }
   return sites;
 }
 
 const ShellStructurePtr& ShellPgaModel::fineStructure() const {
-  std::call_once(fine_structure_once_, [this] { fine_structure_ = std::make_shared<ShellStructure>(parts_.topology); });
+  std::call_once(fine_structure_once_,
+                 [this] { fine_structure_ = std::make_shared<ShellStructure>(parts_->topology); });
   return fine_structure_;
 }
 
 const std::shared_ptr<const Submanifold>& ShellPgaModel::fineSubmanifold() const {
   std::call_once(fine_submanifold_once_, [this] {
-    ShellPga fine = parts_.pga;
+    ShellPga fine = parts_->pga;  // shares the variations
     fine.mean = mean_;
-    for (auto& variation : fine.variations) variation = prolongation_.prolongate(variation);
-    auto calculus = std::make_shared<GeodesicCalculus>(fineStructure(), PairEnergy(parts_.bending, parts_.symmetry));
-    fine_submanifold_ = std::make_shared<Submanifold>(std::move(calculus), std::make_shared<ShellPga>(std::move(fine)));
+    const auto refine = [prolongation = prolongation_](const Vertices& coarse) {
+      return prolongation->prolongate(coarse);
+    };
+    auto calculus = std::make_shared<GeodesicCalculus>(fineStructure(), PairEnergy(parts_->bending, parts_->symmetry));
+    fine_submanifold_ =
+        std::make_shared<Submanifold>(std::move(calculus), std::make_shared<ShellPga>(std::move(fine)), refine);
   });
   return fine_submanifold_;
 }

@@ -41,8 +41,8 @@ class ShellPgaModel {
  public:
   explicit ShellPgaModel(ShellPgaParts parts);
 
-  const Topology& topology() const { return *parts_.topology; }
-  const ShellPgaParts& parts() const { return parts_; }
+  const Topology& topology() const { return *parts_->topology; }
+  const ShellPgaParts& parts() const { return *parts_; }
   const ShellPga& pga() const { return submanifold_->pga(); }
   const Submanifold& submanifold() const { return *submanifold_; }
   const std::shared_ptr<const Submanifold>& submanifoldPtr() const { return submanifold_; }
@@ -50,13 +50,14 @@ class ShellPgaModel {
   int modes() const { return pga().modes(); }
   /// Full-resolution Frechet mean, V x 3.
   const Vertices& mean() const { return mean_; }
-  /// Memory of the arrays and of the prolongation's factor [bytes]; without what the first fine request adds.
+  /// Memory of the arrays and of the prolongation's factor [bytes], once every mode has been used: a mapped file counts
+  /// as a whole. Without what fine requests add.
   std::size_t bytes() const;
 
   /// The coarse rows of a full-resolution shape. Throws InvalidInput naming `field` when the shape does not fit.
   Vertices restrict(const Vertices& shape, const std::string& field) const;
   /// A coarse shape at full resolution.
-  Vertices prolongate(const Vertices& coarse) const { return prolongation_.prolongate(coarse); }
+  Vertices prolongate(const Vertices& coarse) const { return prolongation_->prolongate(coarse); }
 
   /// Where a full-resolution vertex sits on the coarse mesh. Throws InvalidInput naming `field` when out of range.
   Anchor anchorOfVertex(std::int32_t vertex, const std::string& field) const;
@@ -65,16 +66,17 @@ class ShellPgaModel {
 
   /// Sparsity and symbolic factorisation at full resolution, made at the first call.
   const ShellStructurePtr& fineStructure() const;
-  /// The submanifold of the prolongated mean and variations at full resolution, made at the first call.
+  /// The submanifold of the prolongated mean and variations at full resolution, made at the first call. Its pga() has
+  /// the coarse variations; it may outlive the model.
   const std::shared_ptr<const Submanifold>& fineSubmanifold() const;
 
  private:
   Anchor anchorOfPoint(const Eigen::Vector3d& point) const;
   MarkerSite siteAt(const Anchor& anchor, const Eigen::Vector3d& marker) const;
 
-  ShellPgaParts parts_;
+  std::shared_ptr<const ShellPgaParts> parts_;  ///< shared with the submanifold
   std::shared_ptr<const Submanifold> submanifold_;
-  Prolongation prolongation_;
+  std::shared_ptr<const Prolongation> prolongation_;  ///< shared with the fine submanifold
   Vertices mean_;
   Vertices coarse_reference_, coarse_template_;
   mutable std::once_flag fine_structure_once_, fine_submanifold_once_;

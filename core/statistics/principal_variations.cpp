@@ -67,16 +67,18 @@ std::vector<ShellMeasures> measuresOf(const GeodesicCalculus& calculus, const Sh
 }
 
 void fillGramRows(const GramEnergies& energies, Items& items) {
-  items.fill([](auto& done) -> auto& { return done.gram_rows; }, [&](std::size_t i) { return energies.row(i); },
-             [](auto& done, std::size_t i, Eigen::VectorXd row) { done.gram_rows[i] = std::move(row); });
+  items.fill(
+      [](auto& done) -> auto& { return done.gram_rows; }, [&](std::size_t i) { return energies.row(i); },
+      [](auto& done, std::size_t i, Eigen::VectorXd row) { done.gram_rows[i] = std::move(row); });
 }
 
 /// I(mean, shape_i, -1/K) for every arm.
 void fillReflected(const GeodesicCalculus& calculus, const Spider& spider, const GeodesicOptions& options,
                    Items& items) {
-  items.fill([](auto& done) -> auto& { return done.reflected; },
-             [&](std::size_t i) { return calculus.extrapolateBackwards(spider.mean, spider.arms[i][1], options); },
-             [](auto& done, std::size_t i, Solved<Vertices> shape) { done.reflected[i] = std::move(shape); });
+  items.fill(
+      [](auto& done) -> auto& { return done.reflected; },
+      [&](std::size_t i) { return calculus.extrapolateBackwards(spider.mean, spider.arms[i][1], options); },
+      [](auto& done, std::size_t i, Solved<Vertices> shape) { done.reflected[i] = std::move(shape); });
 }
 
 Solved<Vertices> variation(const GeodesicCalculus& calculus, const Vertices& mean, const Eigen::VectorXd& weights,
@@ -88,7 +90,8 @@ Solved<Vertices> variation(const GeodesicCalculus& calculus, const Vertices& mea
     const auto row = static_cast<std::size_t>(i);
     objective.addUndeformed(weights[i] < 0 ? reflected[row] : nodes[row], std::abs(weights[i]) / total);
   }
-  return minimiseShell(objective, *calculus.structure(), mean, {options.max_iterations, options.tolerance, options.stop});
+  return minimiseShell(objective, *calculus.structure(), mean,
+                       {options.max_iterations, options.tolerance, options.stop});
 }
 
 /// p_j and its reflection.
@@ -98,17 +101,18 @@ void fillVariations(const GeodesicCalculus& calculus, const Spider& spider, cons
   for (std::size_t i = 0; i < nodes.size(); ++i) measure(calculus.topology(), spider.arms[i][1], nodes[i]);
   const auto reflected = measuresOf(calculus, items.done().reflected);
   using Pair = std::pair<Solved<Vertices>, Solved<Vertices>>;
-  items.fill([](auto& done) -> auto& { return done.backward; },
-             [&](std::size_t j) -> Pair {
-               auto forward = variation(calculus, spider.mean, eigenvectors.col(static_cast<Eigen::Index>(j)), nodes,
-                                        reflected, options);
-               auto backward = calculus.extrapolateBackwards(spider.mean, forward.solution, options);
-               return {std::move(forward), std::move(backward)};
-             },
-             [](auto& done, std::size_t j, Pair pair) {
-               done.forward[j] = std::move(pair.first);
-               done.backward[j] = std::move(pair.second);
-             });
+  items.fill(
+      [](auto& done) -> auto& { return done.backward; },
+      [&](std::size_t j) -> Pair {
+        auto forward =
+            variation(calculus, spider.mean, eigenvectors.col(static_cast<Eigen::Index>(j)), nodes, reflected, options);
+        auto backward = calculus.extrapolateBackwards(spider.mean, forward.solution, options);
+        return {std::move(forward), std::move(backward)};
+      },
+      [](auto& done, std::size_t j, Pair pair) {
+        done.forward[j] = std::move(pair.first);
+        done.backward[j] = std::move(pair.second);
+      });
 }
 
 }  // namespace
@@ -117,8 +121,8 @@ Solved<ShellPga> principalVariations(const GeodesicCalculus& calculus, const Spi
                                      const GeodesicOptions& options, const VariationsResumption& resumption) {
   const auto n = static_cast<int>(spider.arms.size());
   if (modes < 1 || modes > n - 1)
-    throw InvalidInput("modes", std::to_string(modes) + ", want 1 to " + std::to_string(n - 1) + ", one less than the " +
-                                    std::to_string(n) + " training shapes");
+    throw InvalidInput("modes", std::to_string(modes) + ", want 1 to " + std::to_string(n - 1) +
+                                    ", one less than the " + std::to_string(n) + " training shapes");
   Items items(spider.arms.size(), static_cast<std::size_t>(modes), resumption, options.stop);
   const Solved<ShellPga> cancelled({}, {Termination::kCancelled, 0, 0});
   const GramEnergies energies(calculus, spider);
@@ -141,8 +145,10 @@ Solved<ShellPga> principalVariations(const GeodesicCalculus& calculus, const Spi
   const auto& done = items.done();
   Outcome outcome = combine(done.reflected);
   for (std::size_t j = 0; j < done.forward.size(); ++j) (outcome += *done.forward[j]) += *done.backward[j];
+  std::vector<Vertices> variations;
   for (const auto* shapes : {&done.forward, &done.backward})
-    for (const auto& shape : *shapes) pga.variations.push_back(shape->solution);
+    for (const auto& shape : *shapes) variations.push_back(shape->solution);
+  pga.variations = ShapeStack(variations);
   return {std::move(pga), outcome};
 }
 

@@ -29,25 +29,62 @@ Eigen::VectorXd secondForce(const GeodesicCalculus& calculus, const ShellMeasure
 
 }  // namespace
 
-Submanifold::Submanifold(std::shared_ptr<const GeodesicCalculus> calculus, std::shared_ptr<const ShellPga> pga)
-    : calculus_(std::move(calculus)), pga_(std::move(pga)), distances_(pga_->modes()), forces_(2 * pga_->modes()) {
-  const auto mean = measure(calculus_->topology(), pga_->mean);
-  const auto pins = gaugePins(pga_->mean);
-  const double floor = forceFloor(calculus_->topology(), pga_->mean, mean, calculus_->bending());
-  for (const auto& variation : pga_->variations) {
-    const auto index = static_cast<Eigen::Index>(measures_.size());
-    measures_.push_back(measure(calculus_->topology(), variation));
-    forces_[index] = secondForce(*calculus_, measures_.back(), pga_->mean, mean, pins).norm() + floor;
-    if (index < pga_->modes())
-      distances_[index] =
-          std::sqrt(std::max(calculus_->energy().value(calculus_->topology(), mean, measures_.back()), 0.0));
+Submanifold::Submanifold(std::shared_ptr<const GeodesicCalculus> calculus, std::shared_ptr<const ShellPga> pga,
+                         Refine refine)
+    : calculus_(std::move(calculus)),
+      pga_(std::move(pga)),
+      refine_(std::move(refine)),
+      mean_measures_(measure(calculus_->topology(), pga_->mean)),
+      force_floor_(forceFloor(calculus_->topology(), pga_->mean, mean_measures_, calculus_->bending())),
+      derived_(std::make_unique<Derived[]>(pga_->variations.size())) {}
+
+Vertices Submanifold::variation(std::size_t j) const {
+  const Vertices shape = pga_->variations[j];
+  return refine_ ? refine_(shape) : shape;
+}
+
+void Submanifold::derive(std::size_t j, Derived& result) const {
+  result.measures = measure(calculus_->topology(), variation(j));
+  result.force =
+      secondForce(*calculus_, result.measures, pga_->mean, mean_measures_, gaugePins(pga_->mean)).norm() + force_floor_;
+  if (j < static_cast<std::size_t>(pga_->modes()))
+    result.distance =
+        std::sqrt(std::max(calculus_->energy().value(calculus_->topology(), mean_measures_, result.measures), 0.0));
+  result.done = true;
+}
+
+const Submanifold::Derived& Submanifold::derived(std::size_t j) const {
+  auto& result = derived_[j];
+  std::call_once(result.once, [&] { derive(j, result); });
+  return result;
+}
+
+bool Submanifold::prepare(const std::vector<std::size_t>& vertices, const std::stop_token& stop) const {
+  for (const auto j : vertices) {
+    if (stop.stop_requested()) return false;
+    derived(j);
   }
+  return true;
+}
+
+std::size_t Submanifold::derivedVariations() const {
+  std::size_t count = 0;
+  for (std::size_t j = 0; j < pga_->variations.size(); ++j) count += derived_[j].done ? 1 : 0;
+  return count;
 }
 
 std::size_t Submanifold::bytes() const {
-  auto numbers = distances_.size() + forces_.size();
-  for (const auto& one : measures_) numbers += one.squared_length.size() + one.area.size() + one.angle.size();
-  return sizeof(double) * static_cast<std::size_t>(numbers);
+  const auto& topology = calculus_->topology();
+  const auto numbers = topology.edges().size() + static_cast<std::size_t>(topology.faces().rows()) +
+                       topology.hinges().size();  // of one shape's measures
+  const auto variations = pga_->variations.size();
+  return sizeof(double) * numbers * (variations + 1) + sizeof(Derived) * variations;
+}
+
+double Submanifold::nearestVariation(std::size_t modes) const {
+  double nearest = distance(0);
+  for (std::size_t j = 1; j < modes; ++j) nearest = std::min(nearest, derived(j).distance);
+  return nearest;
 }
 
 std::vector<std::size_t> Submanifold::vertexIndices(int modes) const {
@@ -63,10 +100,17 @@ std::vector<std::size_t> Submanifold::vertexIndices(int modes) const {
 
 Solved<Vertices> Submanifold::average(const Eigen::VectorXd& alpha, const Vertices& start,
                                       const SubmanifoldOptions& options) const {
-  ShellObjective objective(calculus_->structure(), calculus_->bending());
-  objective.setReferenceNorm(alpha.dot(forces_));
+  std::vector<std::size_t> used;
   for (Eigen::Index j = 0; j < alpha.size(); ++j)
-    if (alpha[j] > 0) objective.addUndeformed(measures_[static_cast<std::size_t>(j)], alpha[j]);
+    if (alpha[j] != 0) used.push_back(static_cast<std::size_t>(j));
+  if (!prepare(used, options.stop)) return {start, {Termination::kCancelled, 0, 0}};
+  Eigen::VectorXd forces = Eigen::VectorXd::Zero(alpha.size());
+  for (const auto j : used) forces[static_cast<Eigen::Index>(j)] = derived(j).force;
+  ShellObjective objective(calculus_->structure(), calculus_->bending());
+  objective.setReferenceNorm(alpha.dot(forces));
+  for (const auto j : used)
+    if (const double weight = alpha[static_cast<Eigen::Index>(j)]; weight > 0)
+      objective.addUndeformed(derived(j).measures, weight);
   return minimiseShell(objective, *calculus_->structure(), start, {60, options.shape_tolerance, options.stop});
 }
 
@@ -87,7 +131,7 @@ struct Submanifold::LocalProjection {
 
     AverageEnergy energy(calculus.topology());
     for (Eigen::Index j = 0; j < m; ++j)
-      energy.add(calculus.topology(), owner.measures_[vertices[static_cast<std::size_t>(j)]], calculus.bending(),
+      energy.add(calculus.topology(), owner.derived(vertices[static_cast<std::size_t>(j)]).measures, calculus.bending(),
                  alpha[j]);
     SymmetricBlockMatrix hessian(structure.pattern());
     CholeskyFactor factor(structure.analysis());
@@ -105,7 +149,8 @@ struct Submanifold::LocalProjection {
     curvature.setZero(m, m);
     if (!factorised) return;
     for (Eigen::Index j = 0; j < m; ++j)
-      response.col(j) = -secondForce(calculus, owner.measures_[vertices[static_cast<std::size_t>(j)]], q, here, pins);
+      response.col(j) =
+          -secondForce(calculus, owner.derived(vertices[static_cast<std::size_t>(j)]).measures, q, here, pins);
     factor.solve(response.data(), response.data(), static_cast<int>(m));
     gradient = response.transpose() * secondForce(calculus, target, q, here, pins);
 
@@ -140,7 +185,7 @@ Solved<SubmanifoldPoint> Submanifold::optimiseWeights(const ShellMeasures& targe
       std::max(reach * reach, shellEnergy(topology, measure(topology, pga_->mean), target, calculus_->bending()));
   const double noise = 3e-16 * target.area.sum();
   const auto spread = [&](const Eigen::VectorXd& used) {
-    Eigen::VectorXd all = Eigen::VectorXd::Zero(forces_.size());
+    Eigen::VectorXd all = Eigen::VectorXd::Zero(2 * pga_->modes());
     for (std::size_t j = 0; j < vertices.size(); ++j)
       all[static_cast<Eigen::Index>(vertices[j])] = used[static_cast<Eigen::Index>(j)];
     return all;
@@ -185,10 +230,16 @@ Solved<SubmanifoldPoint> Submanifold::optimiseWeights(const ShellMeasures& targe
   return {SubmanifoldPoint{spread(alpha), 1}, outcome};
 }
 
+SubmanifoldProjection Submanifold::meanProjection() const {
+  const auto steps = static_cast<std::size_t>(pga_->path_steps);
+  return {pointOf(Eigen::VectorXd::Zero(pga_->modes())), pga_->mean, pga_->mean, Path(steps + 1, pga_->mean), 0};
+}
+
 Solved<SubmanifoldProjection> Submanifold::project(const Vertices& shape, const SubmanifoldOptions& options,
                                                    const SubmanifoldProjection* warm) const {
   const auto vertices = vertexIndices(options.modes);
   const auto geodesic_options = geodesicOptions(options);
+  if (!prepare(vertices, options.stop)) return {meanProjection(), {Termination::kCancelled, 0, 0}};
   auto path =
       calculus_->interpolate(pga_->mean, shape, pga_->path_steps, geodesic_options, warm ? warm->geodesic : Path{});
   Outcome outcome = path;
@@ -256,9 +307,9 @@ Solved<Vertices> Submanifold::march(const Vertices& local, double scale, int ste
 
 Solved<SubmanifoldShape> Submanifold::shapeOf(const SubmanifoldPoint& point, const SubmanifoldOptions& options,
                                               const Vertices* near) const {
-  if (point.alpha.size() != forces_.size())
+  if (point.alpha.size() != 2 * pga_->modes())
     throw InvalidInput(
-        "alpha", "has " + std::to_string(point.alpha.size()) + " entries, want " + std::to_string(forces_.size()));
+        "alpha", "has " + std::to_string(point.alpha.size()) + " entries, want " + std::to_string(2 * pga_->modes()));
   for (Eigen::Index j = 0; j < point.alpha.size(); ++j)
     if (!(point.alpha[j] >= 0)) throw InvalidInput("alpha[" + std::to_string(j) + "]", "is negative or not a number");
   if (!(std::abs(point.alpha.sum() - 1) < 1e-6))
@@ -272,14 +323,19 @@ Solved<SubmanifoldShape> Submanifold::shapeOf(const SubmanifoldPoint& point, con
 }
 
 Eigen::VectorXd Submanifold::tangentCoordinates(const SubmanifoldPoint& point) const {
-  const auto j = distances_.size();
-  return (point.alpha.head(j) - point.alpha.tail(j)).cwiseProduct(distances_) / point.scale;
+  const auto modes = pga_->modes();
+  Eigen::VectorXd coordinates = point.alpha.head(modes) - point.alpha.tail(modes);
+  for (Eigen::Index j = 0; j < modes; ++j)
+    if (coordinates[j] != 0) coordinates[j] *= distance(j);
+  return coordinates / point.scale;
 }
 
 SubmanifoldPoint Submanifold::pointOf(const Eigen::VectorXd& tangent_coordinates) const {
-  const Eigen::VectorXd steps = tangent_coordinates.cwiseQuotient(distances_);
+  Eigen::VectorXd steps = tangent_coordinates;
+  for (Eigen::Index j = 0; j < steps.size(); ++j)
+    if (steps[j] != 0) steps[j] /= distance(j);
   const double total = steps.cwiseAbs().sum();
-  const auto j = distances_.size();
+  const auto j = pga_->modes();
   SubmanifoldPoint point;
   if (!(total > 0)) {  // the mean: any variation balanced by its reflection
     point.alpha = Eigen::VectorXd::Constant(2 * j, 0.5 / static_cast<double>(j));

@@ -1,5 +1,10 @@
 #pragma once
 
+#include <atomic>
+#include <functional>
+#include <memory>
+#include <mutex>
+
 #include "core/statistics/principal_variations.h"
 
 namespace shaped {
@@ -19,9 +24,9 @@ struct SubmanifoldShape {
 /// Projection of one shape, with what a similar shape's projection can start from.
 struct SubmanifoldProjection {
   SubmanifoldPoint point;
-  Vertices shape;       ///< P[s] (20), in no particular position
-  Vertices local;       ///< P_loc[s_loc] (18)
-  Path geodesic;        ///< from the mean to s
+  Vertices shape;           ///< P[s] (20), in no particular position
+  Vertices local;           ///< P_loc[s_loc] (18)
+  Path geodesic;            ///< from the mean to s
   double local_energy = 0;  ///< W[s_loc, P_loc[s_loc]] [m^2]
 };
 
@@ -37,14 +42,26 @@ struct SubmanifoldOptions {
 };
 
 /// The submanifold "spanned" by principal variations, with its projection and its inverse. Const and safe to share.
+/// What it derives from a variation (measures, distance, reference force) is computed when it is first wanted, and
+/// kept.
 class Submanifold {
  public:
-  Submanifold(std::shared_ptr<const GeodesicCalculus> calculus, std::shared_ptr<const ShellPga> pga);
+  /// A shape on the calculus's mesh for a variation of the model.
+  using Refine = std::function<Vertices(const Vertices&)>;
+
+  /// refine: carries the variations of `pga`, whose mean is on the calculus's mesh, there as well, whenever one is
+  /// first used, from any thread; empty: they are there.
+  Submanifold(std::shared_ptr<const GeodesicCalculus> calculus, std::shared_ptr<const ShellPga> pga,
+              Refine refine = {});
 
   const ShellPga& pga() const { return *pga_; }
   const GeodesicCalculus& calculus() const { return *calculus_; }
-  /// Memory of what is kept beside mean and variations: their measures [bytes].
+  /// p_j, or p_-j for j >= J, on the calculus's mesh.
+  Vertices variation(std::size_t j) const;
+  /// Memory of what is kept beside mean and variations once all of these have been used [bytes].
   std::size_t bytes() const;
+  /// How many variations have been used so far: what a request has to pay for.
+  std::size_t derivedVariations() const;
 
   /// q(alpha), the minimiser of (26), started from `start`.
   Solved<Vertices> average(const Eigen::VectorXd& alpha, const Vertices& start,
@@ -68,11 +85,25 @@ class Submanifold {
 
  private:
   struct LocalProjection;
+  /// What follows from one variation, made once by whoever first wants it; read without a lock afterwards.
+  struct Derived {
+    std::once_flag once;
+    std::atomic<bool> done = false;
+    ShellMeasures measures;
+    double distance = 0;  ///< dist(mean, p_j), one segment [m]; of reflections not used
+    double force = 0;     ///< |W,2[p_j, mean]|: reference for balances
+  };
+  const Derived& derived(std::size_t j) const;
+  void derive(std::size_t j, Derived& result) const;
+  /// Derives what is missing of these variations; false when the token fires before all are there.
+  bool prepare(const std::vector<std::size_t>& vertices, const std::stop_token& stop) const;
+  double distance(Eigen::Index j) const { return derived(static_cast<std::size_t>(j)).distance; }
+
+  /// What stands for a projection that was cancelled before it began.
+  SubmanifoldProjection meanProjection() const;
   std::vector<std::size_t> vertexIndices(int modes) const;
   /// min_j dist(mean, p_j) over the first `modes` variations [m].
-  double nearestVariation(std::size_t modes) const {
-    return distances_.head(static_cast<Eigen::Index>(modes)).minCoeff();
-  }
+  double nearestVariation(std::size_t modes) const;
   Solved<SubmanifoldPoint> optimiseWeights(const ShellMeasures& target, const std::vector<std::size_t>& vertices,
                                            Eigen::VectorXd start, const SubmanifoldOptions& options, Vertices& q,
                                            double& energy) const;
@@ -82,9 +113,10 @@ class Submanifold {
 
   std::shared_ptr<const GeodesicCalculus> calculus_;
   std::shared_ptr<const ShellPga> pga_;
-  std::vector<ShellMeasures> measures_;  ///< of the variations
-  Eigen::VectorXd distances_;            ///< dist(mean, p_j), one segment each, J entries [m]
-  Eigen::VectorXd forces_;               ///< |W,2[p_j, mean]|, 2J entries: reference for balances
+  Refine refine_;
+  ShellMeasures mean_measures_;
+  double force_floor_;                  ///< added to every reference force
+  std::unique_ptr<Derived[]> derived_;  ///< of the 2J variations
 };
 
 }  // namespace shaped

@@ -181,9 +181,11 @@ ServedModelPtr ModelStore::read(const Key& key) {
     const Lock lock(mutex_);
     makeRoom(key, manifest.tensors_bytes);
   }
-  const auto stored = directory_.load(name, signedVersion(version));
-  auto model = loadShellPga(stored);
-  warm(*model);
+  ShellPgaModelPtr model;
+  const auto stored = directory_.load(name, signedVersion(version), [&](const StoredModel& unverified) {
+    model = loadShellPga(unverified);
+    warm(*model);
+  });
   const auto bytes = model->bytes();
   return std::make_shared<const ServedModel>(ServedModel{name, version, stored.manifest, std::move(model), bytes});
 }
@@ -371,7 +373,7 @@ ServedModelPtr ModelStore::takeIn(IncomingModel& incoming, const std::stop_token
     const Lock lock(mutex_);
     makeRoom({incoming.name(), 0}, incoming.manifest().tensors_bytes);
   }
-  auto model = shellPgaFrom(incoming.manifest(), *tensors);
+  auto model = shellPgaFrom(incoming.manifest(), tensors);
   warm(*model);
   {
     const Lock lock(mutex_);

@@ -24,8 +24,10 @@ ShellPgaParts makeParts() {
   parts.pga.eigenvalues.resize(3);
   parts.pga.eigenvalues << 0.02, 0.01, 0;
   parts.pga.eigenvectors = Eigen::MatrixXd::Identity(3, 2);
+  std::vector<Vertices> variations;
   for (const double factor : {1.1, 1 / 1.1})
-    for (const int axis : {0, 1}) parts.pga.variations.push_back(stretched(coarse.vertices, axis, factor));
+    for (const int axis : {0, 1}) variations.push_back(stretched(coarse.vertices, axis, factor));
+  parts.pga.variations = ShapeStack(variations);
   parts.training.shapes = 3;
   return parts;
 }

@@ -10,7 +10,7 @@ using namespace shaped::test;
 
 namespace {
 
-Submanifold tubeManifold(int modes) { return *tubeSubmanifold(modes); }
+const Submanifold& tubeManifold(int modes) { return *tubeSubmanifold(modes); }
 
 /// A slow linear contraction y -> fixed + a (y - fixed).
 struct Iteration {
@@ -23,7 +23,7 @@ struct Iteration {
 }  // namespace
 
 TEST_CASE("the accelerator finds the fixed point of a linear iteration from as many steps as there are modes") {
-  const auto manifold = tubeManifold(3);
+  const auto& manifold = tubeManifold(3);
   const Iteration iteration;
   ProjectionAccelerator accelerator(manifold);
   CHECK(!accelerator.propose());
@@ -43,7 +43,7 @@ TEST_CASE("the accelerator finds the fixed point of a linear iteration from as m
 }
 
 TEST_CASE("a further unknown that is coupled to the coordinates is accelerated with them") {
-  const auto manifold = tubeManifold(2);
+  const auto& manifold = tubeManifold(2);
   const Iteration iteration;  // of two coordinates and the unknown
   ProjectionAccelerator accelerator(manifold);
   const auto stateOf = [&](const Eigen::VectorXd& z) {
@@ -62,7 +62,7 @@ TEST_CASE("a further unknown that is coupled to the coordinates is accelerated w
 }
 
 TEST_CASE("a proposal that crosses the mean changes to the reflected variation") {
-  const auto manifold = tubeManifold(2);
+  const auto& manifold = tubeManifold(2);
   ProjectionAccelerator accelerator(manifold);
   const Eigen::Vector2d direction(1, 0.25);  // towards coordinates below zero with steps that halve
   Eigen::Vector2d y(0.30, 0.2);
@@ -80,7 +80,7 @@ TEST_CASE("a proposal that crosses the mean changes to the reflected variation")
 }
 
 TEST_CASE("a proposal is at most thirty steps away, and what was forgotten does not count") {
-  const auto manifold = tubeManifold(2);
+  const auto& manifold = tubeManifold(2);
   ProjectionAccelerator accelerator(manifold);
   Eigen::Vector2d y(0.1, 0.1);
   for (const double length : {1e-3, 0.9999e-3}) {  // a limit ten thousand steps away

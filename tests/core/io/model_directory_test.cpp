@@ -130,6 +130,27 @@ TEST_CASE("a removed version stays readable where it is loaded, and its number i
   CHECK(std::filesystem::is_empty(folder.path()));
 }
 
+TEST_CASE("files are worked on while they are verified, and what was thrown counts only if they are whole") {
+  const test::TemporaryFolder folder;
+  const ModelDirectory store(folder.path());
+  store.publish("body", someManifest(), someTensors());
+  double seen = 0;
+  const auto stored = store.load("body", {}, [&](const StoredModel& unverified) {
+    CHECK(unverified.version == 1);
+    seen = unverified.tensors->values<double>("mean")[0];
+  });
+  CHECK(seen == stored.tensors->values<double>("mean")[0]);
+  const auto fail = [](const StoredModel&) { throw InvalidInput("variations[0]", "is no shape"); };
+  CHECK_THROWS_WITH(store.load("body", {}, fail), Contains("variations[0]: is no shape"));
+  const auto tensors = folder.path() / "body" / "1" / "tensors.safetensors";
+  auto flipped = readFile(tensors);
+  flipped.back() = static_cast<char>(flipped.back() ^ 1);
+  writeFile(tensors, flipped);
+  for (int time = 0; time < 2; ++time)
+    CHECK_THROWS_WITH(store.load("body", {}, fail), Contains("tensors.safetensors: has SHA-256 "));
+  CHECK_THROWS_WITH(store.load("body", {}, [](const StoredModel&) {}), Contains("tensors.safetensors: has SHA-256 "));
+}
+
 TEST_CASE("a damaged model is refused and names its file") {
   const test::TemporaryFolder folder;
   const ModelDirectory store(folder.path());

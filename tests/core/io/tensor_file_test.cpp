@@ -177,3 +177,26 @@ TEST_CASE("a tensor file cut or damaged anywhere never crashes, and a cut one is
       }
     }
 }
+
+TEST_CASE("a tensor file is read through in pieces that make up the whole, and one that was cut is an error") {
+  const test::TemporaryFolder folder;
+  const auto path = folder.path() / "large.safetensors";
+  TensorWriter writer;
+  std::vector<double> numbers(20 * (std::size_t{1} << 17) + 77);  // 20 MiB and a bit
+  for (std::size_t i = 0; i < numbers.size(); ++i) numbers[i] = static_cast<double>(i);
+  writer.add("numbers", {std::ssize(numbers)}, std::span<const double>(numbers));
+  writer.write(path);
+  const TensorFile file(path);
+  std::string all;
+  std::size_t pieces = 0;
+  file.readThrough([&](std::string_view piece) { all += piece, ++pieces; });
+  CHECK(all == file.bytes());
+  CHECK(pieces == 11);
+
+  // Kernels before 5.14 would end us here by a signal.
+  std::size_t read = 0;
+  std::filesystem::resize_file(path, std::size_t{6} << 20);
+  CHECK_THROWS_WITH(file.readThrough([&](std::string_view piece) { read += piece.size(); }),
+                    Catch::Contains("cannot be read from the disk at byte 6291456"));
+  CHECK(read == std::size_t{6} << 20);
+}

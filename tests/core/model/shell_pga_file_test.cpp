@@ -43,6 +43,34 @@ TEST_CASE("a model comes back from its file bit for bit") {
   CHECK(loaded->mean() == model.mean());
 }
 
+TEST_CASE("a loaded model's variations lie in its file, which serves them when it has been removed or replaced") {
+  const TemporaryFolder folder;
+  const ModelDirectory directory(folder.path());
+  publishShellPga(directory, "m", *tubeModel());
+  const auto stored = directory.load("m");
+  const auto loaded = loadShellPga(stored);
+  const auto bytes = stored.tensors->bytes();
+  const auto* first = reinterpret_cast<const char*>(loaded->pga().variations[0].data());
+  CHECK(first == reinterpret_cast<const char*>(stored.tensors->values<double>("variations").data()));
+  CHECK(first >= bytes.data());
+  CHECK(&loaded->pga() == &loaded->parts().pga);  // one statistics for model and submanifold
+  CHECK(loaded->pga().variations.bytes() == bytes.size());
+  CHECK(loaded->bytes() >= bytes.size() + loaded->submanifold().bytes());
+  directory.remove("m");
+  publishShellPga(directory, "m", *tubeModel());
+  CHECK(loaded->pga().variations == tubeModel()->pga().variations);
+  const auto kept = loaded->submanifoldPtr();
+  SubmanifoldPoint point;
+  point.alpha = Eigen::VectorXd::Constant(2 * loaded->modes(), 0.5 / loaded->modes());
+  CHECK(kept->shapeOf(point, {}).solution.shape == tubeModel()->submanifold().shapeOf(point, {}).solution.shape);
+}
+
+TEST_CASE("loading derives nothing of the variations") {
+  const auto loaded = throughFile(*tubeModel());
+  CHECK(loaded->submanifold().derivedVariations() == 0);
+  CHECK(loaded->fineSubmanifold()->derivedVariations() == 0);
+}
+
 TEST_CASE("a model keeps its path energy, and one from before there was a choice is directed") {
   auto parts = tubeModel()->parts();
   parts.symmetry = EnergySymmetry::kDirected;
@@ -76,7 +104,15 @@ TEST_CASE("a model whose numbers make no shapes is refused by the tensor at faul
   };
   constexpr double nan = std::numeric_limits<double>::quiet_NaN();
   refused([](ShellPgaParts& parts) { parts.template_shape(3, 1) = nan; }, "template: vertex 3");
-  refused([](ShellPgaParts& parts) { parts.pga.variations[1].setZero(); }, "variations[1]: face 0 is degenerate");
+  const auto changeVariation = [](ShellPgaParts& parts, const std::function<void(Vertices&)>& change) {
+    auto shapes = parts.pga.variations.shapes();
+    change(shapes[1]);
+    parts.pga.variations = ShapeStack(shapes);
+  };
+  refused([&](ShellPgaParts& parts) { changeVariation(parts, [](Vertices& shape) { shape.setZero(); }); },
+          "variations[1]: face 0 is degenerate");
+  refused([&](ShellPgaParts& parts) { changeVariation(parts, [](Vertices& shape) { shape(7, 2) = nan; }); },
+          "variations[1]: vertex 7 has a coordinate that is not a finite number");
   refused([](ShellPgaParts& parts) { parts.pga.eigenvalues[0] = nan; }, "eigenvalues");
   refused([](ShellPgaParts& parts) { parts.pga.eigenvectors(1, 0) = nan; }, "eigenvectors");
 }

@@ -46,9 +46,8 @@ TEST_CASE("the fine level balances the average at full resolution, which prolong
     const auto& fine_model = *model.fineSubmanifold();
     double sum = 0;
     for (Eigen::Index j = 0; j < coefficients.alpha.size(); ++j)
-      sum += coefficients.alpha[j] * shellEnergy(model.topology(),
-                                                 fine_model.pga().variations[static_cast<std::size_t>(j)], q,
-                                                 model.parts().bending);
+      sum += coefficients.alpha[j] *
+             shellEnergy(model.topology(), fine_model.variation(static_cast<std::size_t>(j)), q, model.parts().bending);
     return sum;
   };
   CHECK(energy(fine) < energy(coarse));

@@ -1,6 +1,7 @@
 #include "core/statistics/submanifold.h"
 
 #include <catch2/catch.hpp>
+#include <thread>
 
 #include "core/numerics/error.h"
 #include "core/shell/energy.h"
@@ -263,7 +264,9 @@ TEST_CASE("rigid motions and units change no projection") {
   auto pga = *model.pga;
   pga.mean *= s;
   pga.eigenvalues *= s * s;
-  for (auto& variation : pga.variations) variation *= s;
+  auto variations = pga.variations.shapes();
+  for (auto& variation : variations) variation *= s;
+  pga.variations = ShapeStack(variations);
   const auto calculus =
       std::make_shared<const GeodesicCalculus>(model.set.calculus->structure(), s * s * model.set.calculus->bending());
   const Submanifold scaled(calculus, std::make_shared<const ShellPga>(pga));
@@ -333,4 +336,76 @@ TEST_CASE("the submanifold refuses points and modes that are none, and says when
   const auto solved = model.manifold->project(shape, options);
   CHECK(solved.termination == Termination::kCancelled);
   CHECK(solved.solution.shape.allFinite());
+}
+
+TEST_CASE("what is derived of a variation is computed once it is used, and the answers are the same to the bit") {
+  const Model model(4, 4);
+  const auto fresh = [&] { return Submanifold(model.set.calculus, model.pga); };
+  const auto& shape = model.set.shapes[2];
+  SubmanifoldOptions two;
+  two.modes = 2;
+  const Eigen::VectorXd y = (Eigen::VectorXd(4) << 0, -0.3, 0, 0.05).finished();
+
+  // everything is derived beforehand, as by a request with all modes
+  const auto eager = fresh();
+  eager.average(Eigen::VectorXd::Constant(8, 0.125), model.pga->mean, {});
+  REQUIRE(eager.derivedVariations() == 8);
+
+  const auto projecting = fresh();
+  CHECK(projecting.derivedVariations() == 0);
+  const auto lazy = projecting.project(shape, two), whole = eager.project(shape, two);
+  CHECK(projecting.derivedVariations() == 4);
+  CHECK(lazy.solution.shape == whole.solution.shape);
+  CHECK(lazy.solution.point.alpha == whole.solution.point.alpha);
+  CHECK(lazy.solution.point.scale == whole.solution.point.scale);
+  CHECK(lazy.solution.local_energy == whole.solution.local_energy);
+  CHECK(lazy.residual == whole.residual);
+  CHECK(projecting.tangentCoordinates(lazy.solution.point) == eager.tangentCoordinates(whole.solution.point));
+  CHECK(projecting.derivedVariations() == 4);
+
+  const auto synthesising = fresh();
+  const auto point = synthesising.pointOf(y), same = eager.pointOf(y);
+  CHECK(point.alpha == same.alpha);
+  CHECK(point.scale == same.scale);
+  CHECK(synthesising.shapeOf(point, {}).solution.shape == eager.shapeOf(same, {}).solution.shape);
+  CHECK(synthesising.derivedVariations() == 3);  // p_2 and p_4 for their distances, p_-2 and p_4 for their measures
+
+  // the literal definitions, for all
+  for (std::size_t j = 0; j < 4; ++j) {
+    const double distance = eager.pointOf(Eigen::VectorXd::Unit(4, static_cast<Eigen::Index>(j))).scale;
+    const double energy =
+        model.set.calculus->energy().value(*model.set.mesh.topology, measure(*model.set.mesh.topology, model.pga->mean),
+                                           measure(*model.set.mesh.topology, model.pga->variations[j]));
+    CHECK(distance == Approx(std::sqrt(energy)).epsilon(1e-14));
+  }
+  CHECK(eager.bytes() == fresh().bytes());
+}
+
+TEST_CASE("many threads that want the variations of one model at once get the same answers") {
+  const Model model(2, 4);
+  const auto expected = model.manifold->project(model.set.shapes[1], {}).solution;
+  const Submanifold shared(model.set.calculus, model.pga);
+  std::vector<Vertices> shapes(4);
+  {
+    std::vector<std::jthread> threads;
+    for (auto& shape : shapes)
+      threads.emplace_back([&] { shape = shared.project(model.set.shapes[1], {}).solution.shape; });
+  }
+  for (const auto& shape : shapes) CHECK(shape == expected.shape);
+  CHECK(shared.derivedVariations() == 8);
+}
+
+TEST_CASE("a request that is stopped derives no more variations") {
+  const Model model(2, 4);
+  std::stop_source stop;
+  stop.request_stop();
+  SubmanifoldOptions options;
+  options.stop = stop.get_token();
+  const Submanifold manifold(model.set.calculus, model.pga);
+  const auto projected = manifold.project(model.set.shapes[1], options);
+  CHECK(projected.termination == Termination::kCancelled);
+  CHECK(projected.solution.shape == model.pga->mean);
+  CHECK(projected.solution.point.alpha.sum() == Approx(1));
+  CHECK(manifold.average(somePoint(1).alpha, model.pga->mean, options).termination == Termination::kCancelled);
+  CHECK(manifold.derivedVariations() == 0);
 }
