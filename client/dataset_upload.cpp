@@ -4,6 +4,7 @@
 #include <cctype>
 
 #include "client/mesh.h"
+#include "client/sending.h"
 #include "core/numerics/error.h"
 
 namespace shaped::client {
@@ -98,20 +99,13 @@ v1::Dataset uploadDataset(const std::shared_ptr<grpc::Channel>& channel, const s
   Call call(options);
   v1::UploadDatasetResponse response;
   const auto writer = stub->Upload(call.context(), &response);
-  try {
-    // A failed write means that the daemon has already answered: Finish tells what.
-    bool open = writer->Write(headerOf(name, shapes));
+  sendAll(call, *writer, [&](const auto& send) {
+    bool open = send(headerOf(name, shapes));
     for (std::int64_t i = 0; open && i < shapes.count(); ++i) {
-      open = writer->Write(frameOf(shapes, i));
+      open = send(frameOf(shapes, i));
       progress(i + 1);
     }
-  } catch (...) {
-    call.context()->TryCancel();
-    writer->Finish();
-    throw;
-  }
-  writer->WritesDone();
-  require(writer->Finish());
+  });
   return response.dataset();
 }
 

@@ -1,5 +1,7 @@
 #include "client/jobs.h"
 
+#include "client/sending.h"
+
 namespace shaped::client {
 
 v1::Job getJob(v1::Jobs::Stub& jobs, const std::string& id, const CallOptions& options) {
@@ -42,19 +44,18 @@ v1::Job startMarkerFit(v1::Jobs::Stub& jobs, const v1::FitMarkersJobRequest::Hea
   Call call(options);
   v1::FitMarkersJobResponse response;
   const auto writer = jobs.FitMarkers(call.context(), &response);
-  v1::FitMarkersJobRequest message;
-  *message.mutable_header() = header;
-  // A failed write means that the daemon has already answered: Finish tells what.
-  bool open = writer->Write(message);
-  std::int64_t sent = 0;
-  for (const auto number : frames.numbers) {
-    if (!open) break;
-    *message.mutable_frame() = packFrame(frames, number);
-    open = writer->Write(message);
-    progress(++sent);
-  }
-  writer->WritesDone();
-  require(writer->Finish());
+  sendAll(call, *writer, [&](const auto& send) {
+    v1::FitMarkersJobRequest message;
+    *message.mutable_header() = header;
+    bool open = send(message);
+    std::int64_t sent = 0;
+    for (const auto number : frames.numbers) {
+      if (!open) break;
+      *message.mutable_frame() = packFrame(frames, number);
+      open = send(message);
+      progress(++sent);
+    }
+  });
   return response.job();
 }
 

@@ -8,6 +8,7 @@
 #include <optional>
 #include <system_error>
 
+#include "client/sending.h"
 #include "core/io/file.h"
 #include "core/io/file_error.h"
 #include "core/io/folder.h"
@@ -169,25 +170,18 @@ v1::ModelDescription uploadModel(const std::shared_ptr<grpc::Channel>& channel, 
   Call call(options);
   v1::UploadModelResponse response;
   const auto writer = stub->Upload(call.context(), &response);
-  try {
-    // A failed write means that the daemon has already answered: Finish tells what.
-    bool open = writer->Write(header);
+  sendAll(call, *writer, [&](const auto& send) {
+    bool open = send(header);
     std::uint64_t sent = 0;
     std::string bytes(kPiece, '\0');
     for (v1::UploadModelRequest message; open; progress(static_cast<double>(sent) / tensors.size())) {
       const auto count = tensors.read(bytes);
       if (count == 0) break;
       message.set_tensors(bytes.data(), count);
-      open = writer->Write(message);
+      open = send(message);
       sent += count;
     }
-  } catch (...) {
-    call.context()->TryCancel();
-    writer->Finish();
-    throw;
-  }
-  writer->WritesDone();
-  require(writer->Finish());
+  });
   return response.description();
 }
 

@@ -2,12 +2,10 @@
 
 #include <grpcpp/support/server_callback.h>
 
-#include <functional>
 #include <memory>
-#include <mutex>
 #include <type_traits>
 
-#include "server/rpc/call.h"
+#include "server/rpc/stream_call.h"
 #include "server/scheduling/waiting.h"
 
 namespace shaped::server {
@@ -30,90 +28,68 @@ class StreamHandler {
 /// Reactor: ServerBidiReactor<Request, Response>, or ServerReadReactor<Request> where `final_response` is the one
 /// answer.
 template <class Reactor, class Request, class Response>
-class IncomingStreamCall final : public Reactor,
-                                 public std::enable_shared_from_this<IncomingStreamCall<Reactor, Request, Response>> {
+class IncomingStreamCall final : public Reactor, public StreamCall {
  public:
   using Handler = StreamHandler<Request, Response>;
 
   IncomingStreamCall(Runtime& runtime, WorkerPool& pool, std::string method, grpc::CallbackServerContext& context,
                      Response* final_response, std::unique_ptr<Handler> handler)
-      : runtime_(runtime),
-        pool_(pool),
-        context_(context),
-        call_(runtime, context, std::move(method), runtime.longest_call),
+      : StreamCall(runtime, pool, std::move(method), context),
         final_response_(final_response),
         handler_(std::move(handler)) {}
 
-  void enter() {
-    self_ = this->shared_from_this();
-    const Lock lock(mutex_);
-    Caller caller;
-    if (const auto proper = call_.guarded([&] { caller = call_.caller(); }); !proper.ok()) return end(proper);
-    const auto decision = pool_.openStream(call_.id(), caller);
-    decision.admitted ? read() : end(call_.refusal(decision));
-  }
-
  private:
-  enum class State { kReading, kWorking, kParked, kWriting, kEnded };
-  // Every function below holds mutex_. It is recursive because gRPC may run a reaction inside the call that causes it.
-  using Lock = std::scoped_lock<std::recursive_mutex>;
+  void begin() override { read(); }
 
   void read() {
     state_ = State::kReading;
-    runtime_.timer.cancel(timer_);
-    timer_ = runtime_.timer.schedule(call_.deadline(), [weak = this->weak_from_this()] {
-      if (const auto self = weak.lock()) self->onStop(StopReason::kDeadline);
-    });
+    stopAt(call().deadline(), StopReason::kDeadline);
     this->StartRead(&request_);
   }
 
   void OnReadDone(bool ok) override {
     const Lock lock(mutex_);
     if (state_ == State::kEnded) return;
-    if (!ok && context_.IsCancelled()) call_.stop(StopReason::kClient);
-    if (call_.stopped()) return end(call_.stopStatus());
-    state_ = State::kWorking;
-    call_.queued();
-    pool_.proceed(call_.id(), messageBytes(ok), [self = this->shared_from_this(), ok] { self->work(ok); });
+    if (!ok && cancelled()) call().stop(StopReason::kClient);
+    if (call().stopped()) return endStopped();
+    has_message_ = ok;
+    queueMessage();
   }
 
-  /// On a worker, without the lock: the state keeps everyone else away from request and response.
-  void work(bool has_message) {
+  void queueMessage() { queue(has_message_ ? request_.ByteSizeLong() : 0); }
+
+  void work() override {
     bool answer = false;
     own_response_.Clear();
     grpc::Status status;
     try {
-      status = call_.guarded([&] {
-        if (!has_message) return handler_->end(response(), call_);
+      status = call().guarded([&] {
+        if (!has_message_) return handler_->end(response(), call());
         requireWellFormed(request_);
-        answer = handler_->message(request_, response(), call_);
+        answer = handler_->message(request_, response(), call());
       });
     } catch (const Waiting& waiting) {
-      return park(waiting, has_message);
+      return park(waiting);
     }
     const Lock lock(mutex_);
     if (state_ == State::kEnded) return;
-    if (!status.ok() || !has_message) return end(status);
-    if (call_.stopped()) return end(call_.stopStatus());
+    if (!status.ok() || !has_message_) return end(status);
+    if (call().stopped()) return endStopped();
     answer ? write() : read();
   }
 
   /// The message, or the end, is handled again once what it waits for has come.
-  void park(const Waiting& waiting, bool has_message) {
+  void park(const Waiting& waiting) {
     const Lock lock(mutex_);
     if (state_ == State::kEnded) return;
-    if (call_.stopped()) return end(call_.stopStatus());
+    if (call().stopped()) return endStopped();
     state_ = State::kParked;
-    waiting.then([self = this->shared_from_this(), has_message] { self->resume(has_message); });
+    waiting.then([self = std::static_pointer_cast<IncomingStreamCall>(shared_from_this())] { self->resume(); });
   }
 
-  void resume(bool has_message) {
+  void resume() {
     const Lock lock(mutex_);
-    if (state_ != State::kParked) return;
-    state_ = State::kWorking;
-    call_.queued();
-    pool_.proceed(call_.id(), messageBytes(has_message),
-                  [self = this->shared_from_this(), has_message] { self->work(has_message); });
+    if (state_ == State::kParked) queueMessage();
   }
 
   void write() {
@@ -124,50 +100,23 @@ class IncomingStreamCall final : public Reactor,
   void onWritten(bool ok) {
     const Lock lock(mutex_);
     if (state_ == State::kEnded) return;
-    if (!ok) call_.stop(StopReason::kClient);
-    call_.stopped() ? end(call_.stopStatus()) : read();
+    if (!ok) call().stop(StopReason::kClient);
+    call().stopped() ? endStopped() : read();
   }
-
-  void onStop(StopReason reason) {
-    call_.stop(reason);
-    const bool withdrawn = pool_.withdraw(call_.id());
-    const Lock lock(mutex_);
-    if (withdrawn || state_ == State::kReading || state_ == State::kParked) return end(call_.stopStatus());
-    // A write that waits for a client who does not read would wait for ever. A worker sees the stop by itself.
-    if (state_ == State::kWriting) context_.TryCancel();
-  }
-
-  void end(const grpc::Status& status) {
-    state_ = State::kEnded;
-    if (!call_.finishOnce(status)) return;
-    pool_.leave(call_.id());  // before the answer, as PooledCall does
-    this->Finish(status);
-  }
-
-  std::size_t messageBytes(bool has_message) const { return has_message ? request_.ByteSizeLong() : 0; }
 
   Response& response() { return kAnswersEach ? own_response_ : *final_response_; }
 
+  void finish(const grpc::Status& status) override { this->Finish(status); }
   void OnCancel() override { onStop(StopReason::kClient); }
-  void OnDone() override {
-    runtime_.timer.cancel(timer_);
-    const auto self = std::move(self_);
-  }
+  void OnDone() override { forget(); }
 
   static constexpr bool kAnswersEach = !std::is_base_of_v<grpc::ServerReadReactor<Request>, Reactor>;
 
-  Runtime& runtime_;
-  WorkerPool& pool_;
-  grpc::CallbackServerContext& context_;
-  Call call_;
   Response* final_response_;
   std::unique_ptr<Handler> handler_;
-  std::recursive_mutex mutex_;
-  State state_ = State::kReading;
-  DeadlineTimer::Id timer_;
+  bool has_message_ = false;  ///< else the client has sent all
   Request request_;
   Response own_response_;
-  std::shared_ptr<IncomingStreamCall> self_;
 
  public:
   void OnWriteDone(bool ok) { onWritten(ok); }  // overrides in a bidi reactor only

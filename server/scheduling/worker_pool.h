@@ -33,8 +33,8 @@ class WorkerPool {
   WorkerPool(const WorkerPool&) = delete;
   WorkerPool& operator=(const WorkerPool&) = delete;
 
-  /// Starts the first thread now: for a pool that a thread which gives way to others (nice) may be the first to submit to.
-  /// Throws std::system_error where the system gives none.
+  /// Starts the first thread now: for a pool that a thread which gives way to others (nice) may be the first to submit
+  /// to. Throws std::system_error where the system gives none.
   void hireFirst();
 
   /// A call: takes a place and queues the work, or says when to come back. id: unique among those who hold places.
