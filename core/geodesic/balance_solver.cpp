@@ -15,7 +15,7 @@ enum class Unknown { kDeformed, kUndeformed };
 class BalanceSolver {
  public:
   BalanceSolver(const ShellStructure& structure, const PairEnergy& energy, const Vertices& current, Unknown unknown,
-                const Vertices& known_neighbour, double force)
+                const Vertices& known_neighbour, double force, const std::stop_token& stop)
       : structure_(structure),
         topology_(structure.topology()),
         energy_(energy),
@@ -33,7 +33,7 @@ class BalanceSolver {
       energy.addFirstGradient(topology_, current_measures_, neighbour, 1, gradient);
     known_ = force * pullBack(gradient);
     floor_ = forceFloor(topology_, current_, current_measures_, energy_.bending());
-    factoriseMetric();
+    factoriseMetric(stop);
   }
 
   /// Newton's method on known * amount + force(x) = 0; false when it does not reach the tolerance.
@@ -66,12 +66,12 @@ class BalanceSolver {
   }
 
   /// The metric of shape space at `current`, half the Hessian of W[current, .] at rest.
-  void factoriseMetric() {
+  void factoriseMetric(const std::stop_token& stop) {
     MeasureCurvature curvature(topology_, HessianKind::kExact);
     energy_.addSecondCurvature(topology_, current_measures_, current_measures_, 1, curvature);
     SymmetricBlockMatrix hessian(structure_.pattern());
     pullBackHessian(structure_, current_, curvature, hessian);
-    usable_ = metric_.factorise(hessian, pins_);
+    usable_ = metric_.factorise(hessian, pins_, stop);
   }
 
   double dualNorm(const Eigen::VectorXd& f) const {
@@ -126,6 +126,7 @@ bool BalanceSolver::solve(double amount, Vertices& x, const GeodesicOptions& opt
     outcome.termination = termination;
     return false;
   };
+  if (options.stop.stop_requested()) return fail(Termination::kCancelled);
   if (!usable_) return fail(Termination::kNumericalFailure);
   Eigen::VectorXd own = force(x);
   for (int iteration = 0;; ++iteration, ++outcome.iterations) {
@@ -185,13 +186,15 @@ Solved<Vertices> solveForDeformed(const ShellStructure& structure, const PairEne
                                   const Vertices& current, const Vertices& start, const GeodesicOptions& options,
                                   double force) {
   if (options.stop.stop_requested()) return {start, Outcome{Termination::kCancelled, 0, 1}};
-  return solveBalance(BalanceSolver(structure, energy, current, Unknown::kDeformed, previous, force), start, options);
+  return solveBalance(BalanceSolver(structure, energy, current, Unknown::kDeformed, previous, force, options.stop),
+                      start, options);
 }
 
 Solved<Vertices> solveForUndeformed(const ShellStructure& structure, const PairEnergy& energy, const Vertices& current,
                                     const Vertices& next, const Vertices& start, const GeodesicOptions& options) {
   if (options.stop.stop_requested()) return {start, Outcome{Termination::kCancelled, 0, 1}};
-  return solveBalance(BalanceSolver(structure, energy, current, Unknown::kUndeformed, next, 1), start, options);
+  return solveBalance(BalanceSolver(structure, energy, current, Unknown::kUndeformed, next, 1, options.stop), start,
+                      options);
 }
 
 }  // namespace shaped

@@ -62,7 +62,7 @@ class NetworkNewton {
   /// Gradients of all free nodes; the largest relative imbalance. Left unfinished when the stop token fires, as is all
   /// that follows.
   double updateGradient();
-  /// Hessian, couplings and preconditioner; false when a node's block cannot be factorised.
+  /// Hessian, couplings and preconditioner; false when a node's block cannot be factorised, or stopped.
   bool updateHessian();
   NodeVectors findDirection(double forcing) const;
   bool step(const NodeVectors& direction);
@@ -152,12 +152,13 @@ bool NetworkNewton::factoriseNode(std::size_t n) {
   addNodeCurvature(n, curvature);
   hessians_[n].setZero();
   pullBackHessian(*structure_, shape, curvature, hessians_[n]);
-  if (factors_[n].factorise(hessians_[n], pins_[n])) return true;
+  if (factors_[n].factorise(hessians_[n], pins_[n], stop_)) return true;
+  if (stop_.stop_requested()) return false;
   curvature.reset(HessianKind::kProjected);
   addNodeCurvature(n, curvature);
   SymmetricBlockMatrix projected(structure_->pattern());
   pullBackHessian(*structure_, shape, curvature, projected);
-  return factors_[n].factorise(projected, pins_[n]);
+  return factors_[n].factorise(projected, pins_[n], stop_);
 }
 
 bool NetworkNewton::updateHessian() {
@@ -165,7 +166,7 @@ bool NetworkNewton::updateHessian() {
   forEach(tree_.nodes.size(), [&](std::size_t n) {
     if (stop_.stop_requested()) return;
     done[n] = factoriseNode(n);
-    if (!couplings_[n]) return;
+    if (!couplings_[n] || stop_.stop_requested()) return;
     const auto& segment = network_.segments[static_cast<std::size_t>(tree_.nodes[n].parent_segment)];
     const auto from = static_cast<std::size_t>(segment.from), to = static_cast<std::size_t>(segment.to);
     couplings_[n]->setZero();
@@ -310,10 +311,12 @@ Solved<ElasticNetwork> relax(const ShellStructurePtr& structure, const PairEnerg
     if (outcome.residual <= options.tolerance) break;
     outcome.termination = Termination::kIterationLimit;
     if (outcome.iterations >= options.max_iterations) break;
-    outcome.termination = Termination::kNumericalFailure;
-    if (!run.updateHessian()) break;
+    const bool usable = run.updateHessian();
     outcome.termination = Termination::kCancelled;
     if (options.stop.stop_requested()) break;
+    outcome.termination = Termination::kNumericalFailure;
+    if (!usable) break;
+    outcome.termination = Termination::kCancelled;
     const double forcing = std::clamp(std::sqrt(outcome.residual), 1e-4, 0.1);
     const auto direction = run.findDirection(forcing);
     if (options.stop.stop_requested()) break;

@@ -53,7 +53,8 @@ Path GeodesicCalculus::startPath(const Vertices& a, const Vertices& b, int steps
   Path path{a};
   for (int k = 1; k < steps; ++k) {
     if (stop.stop_requested()) return {};
-    path.push_back(reconstruction_->reconstruct(blendMeasures(from, to, static_cast<double>(k) / steps), path.back()));
+    path.push_back(
+        reconstruction_->reconstruct(blendMeasures(from, to, static_cast<double>(k) / steps), path.back(), stop));
     if (path.back().rows() == 0) return {};
   }
   path.push_back(b);
@@ -148,7 +149,7 @@ Solved<Vertices> GeodesicCalculus::between(const Vertices& a, const Vertices& b,
   Vertices start = (1 - t) * a + t * end;
   const double straight = objective.value(flatten(start));
   if (!(straight <= 2 * t * (1 - t) * energy_.value(topology(), from, to))) {
-    start = reconstruction_->reconstruct(blendMeasures(from, to, t), a);
+    start = reconstruction_->reconstruct(blendMeasures(from, to, t), a, options.stop);
     const Vertices& nearer = t < 0.5 ? a : end;
     if (start.rows() == 0 || !(objective.value(flatten(start)) < objective.value(flatten(nearer)))) start = nearer;
   }
@@ -158,17 +159,20 @@ Solved<Vertices> GeodesicCalculus::between(const Vertices& a, const Vertices& b,
 Solved<Vertices> GeodesicCalculus::through(const Vertices& a, const Vertices& inner, double t,
                                            const GeodesicOptions& options) const {
   if (t == 1) return {inner, Outcome{}};
+  if (options.stop.stop_requested()) return {inner, Outcome{Termination::kCancelled, 0, 1}};
   const double rest = (1 - t) / t;
-  return solveForDeformed(*structure_, energy_, a, inner, aligned(predict(a, inner, rest), inner), options, rest);
+  return solveForDeformed(*structure_, energy_, a, inner, aligned(predict(a, inner, rest, options.stop), inner),
+                          options, rest);
 }
 
-Vertices GeodesicCalculus::predict(const Vertices& previous, const Vertices& current, double length) const {
+Vertices GeodesicCalculus::predict(const Vertices& previous, const Vertices& current, double length,
+                                   const std::stop_token& stop) const {
   const auto before = measure(topology(), previous), here = measure(topology(), current);
   const double step = length * length * shellEnergy(topology(), before, here, bending());
   const Vertices straight = current + length * (current - aligned(previous, current));
   const double straight_energy = shellEnergy(topology(), here, measure(topology(), straight), bending());
   if (straight_energy < 2 * step) return straight;
-  const Vertices curved = reconstruction_->reconstruct(blendMeasures(before, here, 1 + length), current);
+  const Vertices curved = reconstruction_->reconstruct(blendMeasures(before, here, 1 + length), current, stop);
   if (curved.rows() > 0) {
     const double curved_energy = shellEnergy(topology(), here, measure(topology(), curved), bending());
     if (curved_energy < straight_energy || !std::isfinite(straight_energy)) return curved;
@@ -178,12 +182,13 @@ Vertices GeodesicCalculus::predict(const Vertices& previous, const Vertices& cur
 
 Solved<Vertices> GeodesicCalculus::extrapolate(const Vertices& previous, const Vertices& current,
                                                const GeodesicOptions& options) const {
-  return solveForDeformed(*structure_, energy_, previous, current, predict(previous, current, 1), options);
+  return solveForDeformed(*structure_, energy_, previous, current, predict(previous, current, 1, options.stop),
+                          options);
 }
 
 Solved<Vertices> GeodesicCalculus::extrapolateBackwards(const Vertices& current, const Vertices& next,
                                                         const GeodesicOptions& options) const {
-  return solveForUndeformed(*structure_, energy_, current, next, predict(next, current, 1), options);
+  return solveForUndeformed(*structure_, energy_, current, next, predict(next, current, 1, options.stop), options);
 }
 
 Solved<Vertices> GeodesicCalculus::at(const Path& path, double t, const GeodesicOptions& options) const {

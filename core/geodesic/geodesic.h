@@ -72,7 +72,7 @@ class GeodesicCalculus {
   Solved<Path> cascade(const Vertices& a, const Vertices& b, int steps, const GeodesicOptions& options) const;
   Solved<Path> relaxPath(Path path, const GeodesicOptions& options) const;
   /// Where the way from `previous` to `current` leads when it goes on `length` times as far again.
-  Vertices predict(const Vertices& previous, const Vertices& current, double length) const;
+  Vertices predict(const Vertices& previous, const Vertices& current, double length, const std::stop_token& stop) const;
 
   ShellStructurePtr structure_;
   PairEnergy energy_;

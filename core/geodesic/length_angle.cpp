@@ -4,6 +4,7 @@
 #include <Eigen/SparseCholesky>
 
 #include "core/mesh/alignment.h"
+#include "core/numerics/long_piece.h"
 
 namespace shaped {
 namespace {
@@ -77,6 +78,7 @@ Vertices integrate(const Topology& topology, const std::vector<Eigen::Matrix<dou
   entries.emplace_back(0, 0, 1);  // the translation
   Eigen::SparseMatrix<double> laplacian(topology.vertexCount(), topology.vertexCount());
   laplacian.setFromTriplets(entries.begin(), entries.end());
+  const LongPiece piece("integration of frames");
   const Eigen::SimplicialLDLT<Eigen::SparseMatrix<double>> solver(laplacian);
   return solver.solve(Eigen::MatrixXd(rhs));
 }
@@ -94,7 +96,9 @@ LengthAngleReconstruction::LengthAngleReconstruction(TopologyPtr topology)
   }
 }
 
-Vertices LengthAngleReconstruction::reconstruct(const ShellMeasures& wanted, const Vertices& near) const {
+Vertices LengthAngleReconstruction::reconstruct(const ShellMeasures& wanted, const Vertices& near,
+                                                const std::stop_token& stop) const {
+  if (stop.stop_requested()) return {};
   const auto face_count = static_cast<std::size_t>(topology_->faces().rows());
   std::vector<Eigen::Matrix<double, 3, 2>> layouts(face_count);
   for (std::size_t f = 0; f < face_count; ++f) {
@@ -111,8 +115,8 @@ Vertices LengthAngleReconstruction::reconstruct(const ShellMeasures& wanted, con
     const auto& pf = layouts[static_cast<std::size_t>(f)];
     const auto& pg = layouts[static_cast<std::size_t>(g)];
     const auto cf = corners_[h][0], cg = corners_[h][1];
-    const Eigen::Vector2d along_f = pf.row((cf + 1) % 3) - pf.row(cf);        // v0 -> v1 in the first face
-    const Eigen::Vector2d along_g = pg.row((cg + 2) % 3) - pg.row(cg);        // v0 -> v1 in the second face
+    const Eigen::Vector2d along_f = pf.row((cf + 1) % 3) - pf.row(cf);  // v0 -> v1 in the first face
+    const Eigen::Vector2d along_g = pg.row((cg + 2) % 3) - pg.row(cg);  // v0 -> v1 in the second face
     const Eigen::Matrix3d fold =
         Eigen::AngleAxisd(wanted.angle[static_cast<Eigen::Index>(h)], Eigen::Vector3d::UnitX()).toRotationMatrix();
     const Eigen::Matrix3d transition = turnInPlane(along_f) * fold * turnInPlane(along_g).transpose();
@@ -128,17 +132,21 @@ Vertices LengthAngleReconstruction::reconstruct(const ShellMeasures& wanted, con
   for (std::size_t f = 0; f < face_count; ++f)
     addTo(laplacian.block(pattern.lowerBegin(static_cast<std::int32_t>(f))), shift * Eigen::Matrix3d::Identity());
   CholeskyFactor factor(analysis_);
-  if (!factor.factorise(laplacian, Pins(static_cast<std::int32_t>(face_count)))) return {};
+  if (!factor.factorise(laplacian, Pins(static_cast<std::int32_t>(face_count)), stop)) return {};
 
   std::vector<Frame> frames(face_count);
   for (std::size_t f = 0; f < face_count; ++f) frames[f] = frameOf(*topology_, near, static_cast<Eigen::Index>(f));
   Eigen::MatrixXd rows(3 * static_cast<Eigen::Index>(face_count), 3);
   for (int sweep = 0; sweep < 3; ++sweep) {
-    for (std::size_t f = 0; f < face_count; ++f) rows.middleRows<3>(3 * static_cast<Eigen::Index>(f)) = frames[f].transpose();
-    factor.solve(rows.data(), rows.data(), 3);
+    if (stop.stop_requested()) return {};
+    for (std::size_t f = 0; f < face_count; ++f)
+      rows.middleRows<3>(3 * static_cast<Eigen::Index>(f)) = frames[f].transpose();
+    factor.solve(rows.data(), rows.data(), 3, stop);
+    if (stop.stop_requested()) return {};
     for (std::size_t f = 0; f < face_count; ++f)
       frames[f] = nearestRotation(rows.middleRows<3>(3 * static_cast<Eigen::Index>(f)).transpose());
   }
+  if (stop.stop_requested()) return {};
   const Vertices shape = integrate(*topology_, layouts, frames);
   return shape.allFinite() ? apply(alignRigidly(shape, near), shape) : Vertices();
 }
@@ -147,7 +155,8 @@ ShellMeasures blendMeasures(const ShellMeasures& a, const ShellMeasures& b, doub
   ShellMeasures blend;
   blend.squared_length = (a.squared_length.array().log() * (1 - t) + b.squared_length.array().log() * t).exp();
   blend.angle.resize(a.angle.size());
-  for (Eigen::Index h = 0; h < a.angle.size(); ++h) blend.angle[h] = a.angle[h] + t * angleDifference(b.angle[h], a.angle[h]);
+  for (Eigen::Index h = 0; h < a.angle.size(); ++h)
+    blend.angle[h] = a.angle[h] + t * angleDifference(b.angle[h], a.angle[h]);
   return blend;
 }
 

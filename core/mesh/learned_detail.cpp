@@ -64,11 +64,12 @@ class VertexFit {
 
 }  // namespace
 
-SparseRows fitDetail(const std::vector<SurfaceNeighbours>& neighbours, const DetailSample& reference,
-                     const std::vector<DetailSample>& training) {
+std::optional<SparseRows> fitDetail(const std::vector<SurfaceNeighbours>& neighbours, const DetailSample& reference,
+                                    const std::vector<DetailSample>& training, const std::stop_token& stop) {
   std::vector<Eigen::Triplet<double>> triplets;
   triplets.reserve(neighbours.size() * (kPositions + kNormals));
   for (std::size_t v = 0; v < neighbours.size(); ++v) {
+    if (stop.stop_requested()) return std::nullopt;
     const auto& nearest = neighbours[v];
     if (nearest.front().distance == 0) continue;
     const VertexFit fit(nearest, reference.frame.rows() / 2);

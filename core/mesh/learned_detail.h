@@ -1,5 +1,7 @@
 #pragma once
 
+#include <optional>
+#include <stop_token>
 #include <vector>
 
 #include "core/mesh/surface_neighbours.h"
@@ -20,7 +22,8 @@ struct DetailSample {
 ///
 /// neighbours: of each fine vertex among the coarse ones, nearest first. A vertex at distance 0 of the first is kept
 /// and gets no weights. training may be empty: then the smallest weights that reproduce the reference.
-SparseRows fitDetail(const std::vector<SurfaceNeighbours>& neighbours, const DetailSample& reference,
-                     const std::vector<DetailSample>& training);
+/// Nothing once the stop token has fired.
+std::optional<SparseRows> fitDetail(const std::vector<SurfaceNeighbours>& neighbours, const DetailSample& reference,
+                                    const std::vector<DetailSample>& training, const std::stop_token& stop = {});
 
 }  // namespace shaped

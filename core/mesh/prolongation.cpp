@@ -44,18 +44,26 @@ DetailSample sampleOf(const Vertices& shape, const Coarsening& coarsening, const
 
 }  // namespace
 
+std::optional<SparseRows> Prolongation::learnDetail(const Topology& fine, const Coarsening& coarsening,
+                                                    const Vertices& reference, const std::vector<Vertices>& training,
+                                                    const std::stop_token& stop) {
+  checkCoarsening(fine, coarsening);
+  requireValidShape(fine, reference, "reference");
+  checkTraining(fine, training);
+  const auto neighbours = nearestMarked(fine, reference, coarsening.kept, kLearningNeighbours);
+  if (stop.stop_requested()) return std::nullopt;
+  const ThinPlate plate(fine, coarsening, reference, neighbours);
+  std::vector<DetailSample> samples;
+  for (const auto& shape : training) {
+    if (stop.stop_requested()) return std::nullopt;
+    samples.push_back(sampleOf(shape, coarsening, plate));
+  }
+  return fitDetail(neighbours, sampleOf(reference, coarsening, plate), samples, stop);
+}
+
 Prolongation::Prolongation(const TopologyPtr& fine, Coarsening coarsening, const Vertices& reference,
                            const std::vector<Vertices>& training)
-    : coarsening_(std::move(coarsening)) {
-  checkCoarsening(*fine, coarsening_);
-  requireValidShape(*fine, reference, "reference");
-  checkTraining(*fine, training);
-  const auto neighbours = nearestMarked(*fine, reference, coarsening_.kept, kLearningNeighbours);
-  plate_ = std::make_shared<const ThinPlate>(*fine, coarsening_, reference, neighbours);
-  std::vector<DetailSample> samples;
-  for (const auto& shape : training) samples.push_back(sampleOf(shape, coarsening_, *plate_));
-  detail_ = fitDetail(neighbours, sampleOf(reference, coarsening_, *plate_), samples);
-}
+    : Prolongation(fine, coarsening, reference, *learnDetail(*fine, coarsening, reference, training)) {}
 
 Prolongation::Prolongation(const TopologyPtr& fine, Coarsening coarsening, const Vertices& reference, SparseRows detail)
     : coarsening_(std::move(coarsening)), detail_(std::move(detail)) {

@@ -1,6 +1,8 @@
 #pragma once
 
 #include <memory>
+#include <optional>
+#include <stop_token>
 #include <vector>
 
 #include "core/mesh/coarsening.h"
@@ -34,6 +36,11 @@ class Prolongation {
 
   /// From stored parts: `detail` as another Prolongation of the same fine mesh, coarsening and reference had it.
   Prolongation(const TopologyPtr& fine, Coarsening coarsening, const Vertices& reference, SparseRows detail);
+
+  /// The detail() of a Prolongation with these arguments; nothing once the stop token has fired.
+  static std::optional<SparseRows> learnDetail(const Topology& fine, const Coarsening& coarsening,
+                                               const Vertices& reference, const std::vector<Vertices>& training,
+                                               const std::stop_token& stop = {});
 
   /// coarse: C x 3. Throws InvalidInput naming `coarse` when it has the wrong size or is not finite.
   Vertices prolongate(const Vertices& coarse) const;

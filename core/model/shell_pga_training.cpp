@@ -172,7 +172,9 @@ Solved<ShellPgaModelPtr> trainShellPga(const ShellPgaTrainingSet& set, const She
 
   report(progress, "prolongation", 0.9);
   parts.reference = set.shapes[nearestToMean(calculus, spider.solution)];
-  parts.detail = Prolongation(set.topology, parts.coarsening, parts.reference, set.shapes).detail();
+  auto detail = Prolongation::learnDetail(*set.topology, parts.coarsening, parts.reference, set.shapes, stop);
+  if (!detail) return {nullptr, cancelled};
+  parts.detail = std::move(*detail);
   const Outcome outcome = parts.training.combined();
   report(progress, "done", 1);
   return {std::make_shared<const ShellPgaModel>(std::move(parts)), outcome};

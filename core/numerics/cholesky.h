@@ -1,6 +1,7 @@
 #pragma once
 
 #include <memory>
+#include <stop_token>
 
 #include "core/numerics/block_matrix.h"
 #include "core/numerics/pins.h"
@@ -35,13 +36,14 @@ class CholeskyFactor {
   CholeskyFactor(CholeskyFactor&&) noexcept;
   CholeskyFactor& operator=(CholeskyFactor&&) noexcept;
 
-  /// Factorises; false when the matrix restricted to the free unknowns is not positive definite (or not finite), and
-  /// then solve() must not be called.
-  bool factorise(const SymmetricBlockMatrix& matrix, const Pins& pins);
+  /// Factorises; false when the matrix restricted to the free unknowns is not positive definite (or not finite), or
+  /// when the stop token has fired, and then solve() must not be called. Looks at the token before each dense kernel.
+  bool factorise(const SymmetricBlockMatrix& matrix, const Pins& pins, const std::stop_token& stop = {});
 
   /// x = A^-1 b with zero in the pinned unknowns, whatever b holds there; x and b may be the same, `columns` right-hand
-  /// sides one after another. May be called from several threads at once.
-  void solve(const double* b, double* x, int columns = 1) const;
+  /// sides one after another. May be called from several threads at once. Once the stop token has fired, x is not to be
+  /// used.
+  void solve(const double* b, double* x, int columns = 1, const std::stop_token& stop = {}) const;
 
  private:
   struct Impl;

@@ -7,6 +7,8 @@
 #include <stdexcept>
 
 #include "core/numerics/cholesky.h"
+#include "core/numerics/interruptible_blas.h"
+#include "core/numerics/long_piece.h"
 #include "core/numerics/permuted_pattern.h"
 #include "core/numerics/threads.h"
 
@@ -71,6 +73,7 @@ cholmod_dense denseView(std::size_t rows, std::size_t columns, double* values) {
 
 /// Symbolic analysis of a lower triangle in the order given (or as it stands), postordered if wanted.
 FactorPtr analyse(cholmod_sparse matrix, int* order, bool postorder, int method) {
+  const LongPiece piece("symbolic analysis");
   auto* common = ThreadCommon::get();
   common->supernodal = method;
   common->method[0].ordering = order ? CHOLMOD_GIVEN : CHOLMOD_NATURAL;
@@ -82,6 +85,7 @@ FactorPtr analyse(cholmod_sparse matrix, int* order, bool postorder, int method)
 
 /// METIS nested dissection of the node graph.
 std::vector<idx_t> nestedDissection(const BlockPattern& pattern) {
+  const LongPiece piece("nested dissection");
   idx_t n = pattern.nodeCount();
   std::vector<idx_t> begin{0}, neighbours;
   for (std::int32_t node = 0; node < n; ++node) {
@@ -149,7 +153,9 @@ CholeskyFactor::~CholeskyFactor() = default;
 CholeskyFactor::CholeskyFactor(CholeskyFactor&&) noexcept = default;
 CholeskyFactor& CholeskyFactor::operator=(CholeskyFactor&&) noexcept = default;
 
-bool CholeskyFactor::factorise(const SymmetricBlockMatrix& matrix, const Pins& pins) {
+bool CholeskyFactor::factorise(const SymmetricBlockMatrix& matrix, const Pins& pins, const std::stop_token& stop) {
+  if (stop.stop_requested()) return false;
+  const LongPiece piece("factorisation");
   thread_local std::vector<double> memory;
   const auto& permuted = impl_->permuted();
   double* values = scratch(memory, permuted.rows().size());
@@ -159,11 +165,13 @@ bool CholeskyFactor::factorise(const SymmetricBlockMatrix& matrix, const Pins& p
   if ((0 * all).sum() != 0) return false;  // NaN when an entry is not finite, which BLAS would not notice
   auto* common = ThreadCommon::get();
   auto view = sparseView(permuted.size(), permuted.begin(), permuted.rows(), values);
+  const InterruptibleBlas blas(stop);
   return cholmod_factorize(&view, impl_->factor.get(), common) && common->status == CHOLMOD_OK &&
-         impl_->factor->minor == impl_->factor->n;
+         impl_->factor->minor == impl_->factor->n && !stop.stop_requested();
 }
 
-void CholeskyFactor::solve(const double* b, double* x, int columns) const {
+void CholeskyFactor::solve(const double* b, double* x, int columns, const std::stop_token& stop) const {
+  const LongPiece piece("solve");
   thread_local std::vector<double> permuted_memory, work_memory;
   const auto n = impl_->permuted().size(), count = static_cast<std::size_t>(columns);
   double* permuted = scratch(permuted_memory, n * count);
@@ -171,6 +179,7 @@ void CholeskyFactor::solve(const double* b, double* x, int columns) const {
   for (std::size_t c = 0; c < count; ++c) impl_->permuted().permute(b + n * c, permuted + n * c);
   auto* common = ThreadCommon::get();
   auto solution = denseView(n, count, permuted), work = denseView(work_size, 1, scratch(work_memory, work_size));
+  const InterruptibleBlas blas(stop);
   if (!cholmod_super_lsolve(impl_->factor.get(), &solution, &work, common) ||
       !cholmod_super_ltsolve(impl_->factor.get(), &solution, &work, common))
     throw std::runtime_error("CHOLMOD could not solve with a factor");

@@ -4,6 +4,7 @@
 #include <Eigen/SparseCholesky>
 
 #include "core/numerics/cholesky.h"
+#include "core/numerics/long_piece.h"
 
 namespace shaped {
 
@@ -23,7 +24,9 @@ CholeskyFactor::~CholeskyFactor() = default;
 CholeskyFactor::CholeskyFactor(CholeskyFactor&&) noexcept = default;
 CholeskyFactor& CholeskyFactor::operator=(CholeskyFactor&&) noexcept = default;
 
-bool CholeskyFactor::factorise(const SymmetricBlockMatrix& matrix, const Pins& pins) {
+bool CholeskyFactor::factorise(const SymmetricBlockMatrix& matrix, const Pins& pins, const std::stop_token& stop) {
+  if (stop.stop_requested()) return false;
+  const LongPiece piece("factorisation");
   Eigen::SparseMatrix<double> sparse = matrix.toSparse();
   for (int column = 0; column < sparse.outerSize(); ++column)
     for (Eigen::SparseMatrix<double>::InnerIterator it(sparse, column); it; ++it)
@@ -34,10 +37,11 @@ bool CholeskyFactor::factorise(const SymmetricBlockMatrix& matrix, const Pins& p
   impl_->analysed = true;
   impl_->held = pins;
   impl_->solver.factorize(sparse);
-  return impl_->solver.info() == Eigen::Success;
+  return impl_->solver.info() == Eigen::Success && !stop.stop_requested();
 }
 
-void CholeskyFactor::solve(const double* b, double* x, int columns) const {
+void CholeskyFactor::solve(const double* b, double* x, int columns, const std::stop_token&) const {
+  const LongPiece piece("solve");
   const auto n = impl_->solver.rows();
   const Eigen::MatrixXd solution = impl_->solver.solve(Eigen::Map<const Eigen::MatrixXd>(b, n, columns));
   Eigen::Map<Eigen::MatrixXd>(x, n, columns) = solution;

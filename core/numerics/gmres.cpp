@@ -1,7 +1,7 @@
 #include "core/numerics/gmres.h"
 
-#include <Eigen/Jacobi>
 #include <Eigen/Dense>
+#include <Eigen/Jacobi>
 #include <vector>
 
 namespace shaped {
@@ -9,9 +9,10 @@ namespace shaped {
 double gmres(const LinearMap& matrix, const LinearMap& preconditioner, const Eigen::VectorXd& b, double reduction,
              int limit, Eigen::VectorXd& x, const std::stop_token& stop) {
   Eigen::VectorXd r, w, image;
+  x.setZero(b.size());
+  if (stop.stop_requested()) return 1;
   preconditioner(b, r);
   const double start = r.norm();
-  x.setZero(b.size());
   if (start == 0) return 0;
   std::vector<Eigen::VectorXd> basis{r / start};
   Eigen::MatrixXd h = Eigen::MatrixXd::Zero(limit + 1, limit);
@@ -31,7 +32,8 @@ double gmres(const LinearMap& matrix, const LinearMap& preconditioner, const Eig
     for (int i = 0; i < k; ++i) {
       const double upper = h(i, k), lower = h(i + 1, k);
       h(i, k) = rotations[static_cast<std::size_t>(i)].c() * upper + rotations[static_cast<std::size_t>(i)].s() * lower;
-      h(i + 1, k) = -rotations[static_cast<std::size_t>(i)].s() * upper + rotations[static_cast<std::size_t>(i)].c() * lower;
+      h(i + 1, k) =
+          -rotations[static_cast<std::size_t>(i)].s() * upper + rotations[static_cast<std::size_t>(i)].c() * lower;
     }
     const double length = std::hypot(h(k, k), rest);
     if (!(length > 0)) break;

@@ -6,8 +6,8 @@
 namespace shaped {
 namespace {
 
-/// One run of the method: current iterate, its gradient, and what is reused from step to step. Polls the stop token around
-/// every factorisation, which itself is not interrupted, and at every value of the line search.
+/// One run of the method: current iterate, its gradient, and what is reused from step to step. Looks at the stop token
+/// around every Hessian, in every factorisation, and at every value of the line search.
 class NewtonRun {
  public:
   NewtonRun(NewtonObjective& objective, const CholeskyAnalysisPtr& analysis, const Eigen::VectorXd& start,
@@ -35,7 +35,7 @@ class NewtonRun {
       hessian_.setZero();
       objective_.hessian(x_, projected, hessian_);
       if (stopped()) return false;
-      const bool positive = factor_.factorise(hessian_, pins_);
+      const bool positive = factor_.factorise(hessian_, pins_, stop_);
       if (stopped()) return false;
       if (!positive) continue;
       factor_.solve(gradient_.data(), direction_.data());
@@ -76,6 +76,7 @@ double backtrack(const std::function<double(double)>& value, double at_zero, dou
 
 Solved<Eigen::VectorXd> minimise(NewtonObjective& objective, const CholeskyAnalysisPtr& analysis,
                                  const Eigen::VectorXd& start, const NewtonOptions& options) {
+  if (options.stop.stop_requested()) return {start, Outcome{Termination::kCancelled, 0, 1}};
   NewtonRun run(objective, analysis, start, options.stop);
   const auto unless_stopped = [&](Termination otherwise) {
     return run.stopped() ? Termination::kCancelled : otherwise;

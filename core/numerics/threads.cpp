@@ -6,6 +6,13 @@ extern "C" void openblas_set_num_threads(int);
 // Exported, though in no header; weak, for a build of OpenBLAS that has no threads.
 extern "C" __attribute__((weak)) int blas_thread_shutdown_();
 
+#ifdef SHAPED_WRAPPED_BLAS
+/// CHOLMOD's loops over a supernode are parallel regions, which are never more than one thread here (below). libgomp
+/// makes a team of that one for each, with memory and two calls of the kernel: a tenth of the time of small
+/// factorisations. The linker leads them here (--wrap).
+extern "C" void __wrap_GOMP_parallel(void (*region)(void*), void* data, unsigned, unsigned) { region(data); }
+#endif
+
 namespace shaped {
 
 void limitLibraryThreads() {

@@ -115,14 +115,14 @@ Solved<Vertices> Submanifold::average(const Eigen::VectorXd& alpha, const Vertic
 }
 
 /// The local projection (18) at one point: the derivative of q(alpha) by the implicit function theorem (27)-(29), and
-/// the Gauss-Newton model of W[s_loc, q(alpha)] that follows from it.
+/// the Gauss-Newton model of W[s_loc, q(alpha)] that follows from it. Not to be used once the stop token has fired.
 struct Submanifold::LocalProjection {
   Eigen::MatrixXd response;   ///< dq/dalpha, 3V x m
   Eigen::VectorXd gradient;   ///< of W[s_loc, q(alpha)], m
   Eigen::MatrixXd curvature;  ///< m x m, positive semi-definite
 
   LocalProjection(const Submanifold& owner, const ShellMeasures& target, const std::vector<std::size_t>& vertices,
-                  const Eigen::VectorXd& alpha, const Vertices& q) {
+                  const Eigen::VectorXd& alpha, const Vertices& q, const std::stop_token& stop) {
     const auto& calculus = *owner.calculus_;
     const auto& structure = *calculus.structure();
     const auto pins = gaugePins(q);
@@ -137,21 +137,23 @@ struct Submanifold::LocalProjection {
     CholeskyFactor factor(structure.analysis());
     bool factorised = false;
     for (const auto kind : {HessianKind::kExact, HessianKind::kProjected}) {
+      if (stop.stop_requested()) break;
       MeasureCurvature measures(calculus.topology(), kind);
       energy.addCurvature(calculus.topology(), here, 1, measures);
       hessian.setZero();
       pullBackHessian(structure, q, measures, hessian);
-      factorised = factor.factorise(hessian, pins);
+      factorised = factor.factorise(hessian, pins, stop);
       if (factorised) break;
     }
     response.setZero(q.size(), m);
     gradient.setZero(m);
     curvature.setZero(m, m);
     if (!factorised) return;
-    for (Eigen::Index j = 0; j < m; ++j)
+    for (Eigen::Index j = 0; j < m && !stop.stop_requested(); ++j)
       response.col(j) =
           -secondForce(calculus, owner.derived(vertices[static_cast<std::size_t>(j)]).measures, q, here, pins);
-    factor.solve(response.data(), response.data(), static_cast<int>(m));
+    factor.solve(response.data(), response.data(), static_cast<int>(m), stop);
+    if (stop.stop_requested()) return;
     gradient = response.transpose() * secondForce(calculus, target, q, here, pins);
 
     MeasureCurvature measures(calculus.topology(), HessianKind::kProjected);
@@ -201,7 +203,8 @@ Solved<SubmanifoldPoint> Submanifold::optimiseWeights(const ShellMeasures& targe
   for (outcome.iterations = 0;; ++outcome.iterations) {
     outcome.termination = Termination::kCancelled;
     if (options.stop.stop_requested()) break;
-    const LocalProjection model(*this, target, vertices, alpha, q);
+    const LocalProjection model(*this, target, vertices, alpha, q, options.stop);
+    if (options.stop.stop_requested()) break;
     const Eigen::VectorXd step = model.step(alpha);
     const double slope = model.gradient.dot(step);
     outcome.residual = std::sqrt(std::max(-slope, 0.0) / size);
@@ -250,6 +253,7 @@ Solved<SubmanifoldProjection> Submanifold::project(const Vertices& shape, const 
   result.point.scale = distance > 0 ? std::min(longest, options.kappa * nearest / distance) : longest;
   const auto local = calculus_->at(path.solution, result.point.scale, geodesic_options);
   outcome += local;
+  if (outcome.termination == Termination::kCancelled) return {meanProjection(), outcome};
 
   Eigen::VectorXd start(static_cast<Eigen::Index>(vertices.size()));
   for (std::size_t j = 0; j < vertices.size(); ++j)
@@ -260,6 +264,7 @@ Solved<SubmanifoldProjection> Submanifold::project(const Vertices& shape, const 
   const auto weights = optimiseWeights(measure(calculus_->topology(), local.solution), vertices, start, options,
                                        result.local, result.local_energy);
   outcome += weights;
+  if (weights.termination == Termination::kCancelled) return {meanProjection(), outcome};
   result.point.alpha = weights.solution.alpha;
   auto scaled = rescale(result.local, result.point.scale, options);
   outcome += scaled;
@@ -316,6 +321,7 @@ Solved<SubmanifoldShape> Submanifold::shapeOf(const SubmanifoldPoint& point, con
     throw InvalidInput("alpha", "sums to " + std::to_string(point.alpha.sum()) + ", want 1");
   if (!(point.scale > 0) || !std::isfinite(point.scale)) throw InvalidInput("scale", "must be a positive number");
   auto local = average(point.alpha, near ? *near : pga_->mean, options);
+  if (local.termination == Termination::kCancelled) return {{pga_->mean, std::move(local.solution)}, local};
   auto scaled = rescale(local.solution, point.scale, options);
   Outcome outcome = local;
   outcome += scaled;

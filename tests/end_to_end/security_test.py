@@ -269,7 +269,7 @@ class Tokens(SecurityCase):
         denied = run("infer", DENIED, "cancel", training).json["error"]
         self.assertEqual(denied["reason"], "NOT_ALLOWED")
         run("train", SUCCESS, "cancel", training), run("admin", SUCCESS, "cancel", training)
-        counted = run("admin", SUCCESS, "top", "--once").json["denials"]
+        counted = run("admin", SUCCESS, "top", "--count", 1).json["denials"]
         self.assertEqual(counted["UNAUTHENTICATED"], 0)
         self.assertGreaterEqual(counted["PERMISSION_DENIED"], 5)
 

@@ -5,6 +5,7 @@
 #include <limits>
 #include <thread>
 
+#include "core/numerics/long_piece.h"
 #include "tests/support/random_blocks.h"
 
 using namespace shaped;
@@ -124,6 +125,27 @@ TEST_CASE("indefinite, singular and non-finite matrices are refused, and the fac
     }
   }
   CHECK_FALSE(factor.factorise(symmetricBlocks(pattern, -good), none));
+}
+
+TEST_CASE("a factorisation that is stopped says so, and the next one is as ever") {
+  const std::int32_t nodes = 40;
+  const auto pattern = ringPattern(nodes);
+  std::mt19937 random(4);
+  const auto matrix = symmetricBlocks(pattern, randomPositive(*pattern, random));
+  const Pins pins(nodes);
+  CholeskyFactor factor(std::make_shared<const CholeskyAnalysis>(pattern));
+  REQUIRE(factor.factorise(matrix, pins));
+  const Eigen::VectorXd b = Eigen::VectorXd::Random(3 * nodes);
+  const auto expected = solveWith(factor, b);
+  std::stop_source before, midst;
+  before.request_stop();
+  CHECK_FALSE(factor.factorise(matrix, pins, before.get_token()));
+  {
+    const PieceListening listening([&](std::string_view, bool) { midst.request_stop(); });  // once it has begun
+    CHECK_FALSE(factor.factorise(matrix, pins, midst.get_token()));
+  }
+  REQUIRE(factor.factorise(matrix, pins, std::stop_source().get_token()));
+  CHECK(solveWith(factor, b) == expected);
 }
 
 TEST_CASE("a factor can be moved: the new owner solves, and an assigned-over one takes the other's matrix") {

@@ -57,12 +57,17 @@ TEST_CASE("every kind of failure has its status") {
   CHECK(statusFor(7).error_code() == grpc::INTERNAL);
 }
 
-TEST_CASE("a full disk is a resource, another disk failure is internal") {
+TEST_CASE("a full disk is a resource, one that may not be written to the operator's, another failure internal") {
   const auto reason = [](int code) { return std::generic_category().message(code); };
   CHECK(statusFor(FileError("m", "cannot be written: " + reason(ENOSPC))).error_code() == grpc::RESOURCE_EXHAUSTED);
   CHECK(statusFor(FileError("m", "cannot be written: " + reason(EIO))).error_code() == grpc::INTERNAL);
   CHECK(statusFor(std::system_error(ENOSPC, std::generic_category())).error_code() == grpc::RESOURCE_EXHAUSTED);
-  CHECK(statusFor(std::system_error(EACCES, std::generic_category())).error_code() == grpc::INTERNAL);
+  CHECK(statusFor(std::system_error(EIO, std::generic_category())).error_code() == grpc::INTERNAL);
+  for (const int code : {EROFS, EACCES, EPERM})
+    CHECK(statusFor(std::system_error(code, std::generic_category())).error_code() == grpc::UNAVAILABLE);
+  CHECK(
+      statusFor(FileError("jobs.sqlite", "cannot be written: the file or its file system is read-only")).error_code() ==
+      grpc::UNAVAILABLE);
 }
 
 TEST_CASE("what was turned away for want of something says of what") {
