@@ -192,7 +192,7 @@ std::vector<std::string> screenOf(const Statistics& now, const Statistics* befor
   std::vector<std::string> lines{headLine(now, before, server)};
   for (const auto& pool : now.pools()) lines.push_back(poolLine(pool));
   lines.push_back("refusals " + countsText(now.refusals(), [](const auto& entry) { return entry.cause(); }));
-  if (now.denials_size() > 0)
+  if (std::any_of(now.denials().begin(), now.denials().end(), [](const auto& entry) { return entry.count() > 0; }))
     lines.push_back("denials  " + countsText(now.denials(), [](const auto& entry) { return entry.code(); }));
   lines.push_back("jobs     " + countsText(now.jobs(), [](const auto& entry) { return entry.state(); }));
   lines.push_back(modelsLine(now));

@@ -76,7 +76,6 @@ double backtrack(const std::function<double(double)>& value, double at_zero, dou
 
 Solved<Eigen::VectorXd> minimise(NewtonObjective& objective, const CholeskyAnalysisPtr& analysis,
                                  const Eigen::VectorXd& start, const NewtonOptions& options) {
-  if (options.stop.stop_requested()) return {start, Outcome{Termination::kCancelled, 0, 1}};
   NewtonRun run(objective, analysis, start, options.stop);
   const auto unless_stopped = [&](Termination otherwise) {
     return run.stopped() ? Termination::kCancelled : otherwise;

@@ -120,6 +120,7 @@ struct Submanifold::LocalProjection {
   Eigen::MatrixXd response;   ///< dq/dalpha, 3V x m
   Eigen::VectorXd gradient;   ///< of W[s_loc, q(alpha)], m
   Eigen::MatrixXd curvature;  ///< m x m, positive semi-definite
+  bool usable = false;        ///< else no Hessian could be factorised, and all of this is zero
 
   LocalProjection(const Submanifold& owner, const ShellMeasures& target, const std::vector<std::size_t>& vertices,
                   const Eigen::VectorXd& alpha, const Vertices& q, const std::stop_token& stop) {
@@ -148,7 +149,8 @@ struct Submanifold::LocalProjection {
     response.setZero(q.size(), m);
     gradient.setZero(m);
     curvature.setZero(m, m);
-    if (!factorised) return;
+    usable = factorised;
+    if (!usable) return;
     for (Eigen::Index j = 0; j < m && !stop.stop_requested(); ++j)
       response.col(j) =
           -secondForce(calculus, owner.derived(vertices[static_cast<std::size_t>(j)]).measures, q, here, pins);
@@ -205,10 +207,11 @@ Solved<SubmanifoldPoint> Submanifold::optimiseWeights(const ShellMeasures& targe
     if (options.stop.stop_requested()) break;
     const LocalProjection model(*this, target, vertices, alpha, q, options.stop);
     if (options.stop.stop_requested()) break;
+    outcome.termination = Termination::kNumericalFailure;
+    if (!model.usable) break;
     const Eigen::VectorXd step = model.step(alpha);
     const double slope = model.gradient.dot(step);
     outcome.residual = std::sqrt(std::max(-slope, 0.0) / size);
-    outcome.termination = Termination::kNumericalFailure;
     if (!std::isfinite(slope)) break;
     outcome.termination = Termination::kConverged;
     if (outcome.residual <= options.tolerance) break;

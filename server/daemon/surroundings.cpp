@@ -28,8 +28,7 @@ std::map<std::string, std::uint64_t> jobCounts(const JobRegistry& registry) {
 
 std::map<std::string, std::uint64_t> denialCounts(const Access* access) {
   std::map<std::string, std::uint64_t> counts;
-  if (!access) return counts;
-  for (const auto& [code, count] : access->denials()) counts[nameOf(code)] = count;
+  for (const auto& [code, count] : access ? access->denials() : Access().denials()) counts[nameOf(code)] = count;
   return counts;
 }
 

@@ -12,7 +12,7 @@ std::vector<ModelMemory> modelMemory(ModelStore& models);
 /// Every state, also those that no job is in.
 std::map<std::string, std::uint64_t> jobCounts(const JobRegistry& registry);
 
-/// Both ways to be turned away; nothing where nobody is asked who he is (access null).
+/// Both ways to be turned away; never happened where nobody is asked who he is (access null).
 std::map<std::string, std::uint64_t> denialCounts(const Access* access);
 
 /// Makes all methods of a service known, so that their counts begin at 0 and not at their first call.
