@@ -6,7 +6,7 @@
 namespace shaped {
 
 /// Marks work of milliseconds or more on a mesh of thousands of vertices that looks at no stop token on its way, or
-/// only in the midst: after a stop none may begin. Tests count them and the experiment "stop" times them; where nobody
+/// only in the midst: after a stop none may begin but "solve", a tenth of a factorisation. Tests count them; where nobody
 /// listens, marking one costs two loads. name: a literal.
 class LongPiece {
  public:

@@ -80,6 +80,11 @@ JobRunner::~JobRunner() {
   for (auto& thread : threads_) thread.join();
 }
 
+bool JobRunner::publishes(const std::string& kind) const {
+  const auto found = kinds_.find(kind);
+  return found == kinds_.end() || found->second.published;
+}
+
 void JobRunner::settle(const JobRecord& left) {
   const auto kind = kinds_.find(left.kind);
   const auto version = kind == kinds_.end() || !kind->second.published ? 0 : kind->second.published(left);

@@ -75,6 +75,8 @@ class JobRunner {
   /// The file of records (record_file.h) that a job has left. Throws NotFound; WrongState when it has not succeeded, or
   /// is of a kind without a result.
   std::filesystem::path resultOf(const std::string& job) const;
+  /// Whether jobs of this kind publish models; of an unknown kind yes, as nobody knows.
+  bool publishes(const std::string& kind) const;
   /// Claims no more jobs and asks the running ones to keep a checkpoint and stop; they are queued again, for the next
   /// start. Does not wait.
   void leave();

@@ -34,10 +34,11 @@ void list(const JobRegistry& registry, const v1::ListJobsRequest& request, v1::L
   for (const auto& record : records) toProto(record, *response.add_jobs());
 }
 
-/// Who may start jobs that only answer may cancel and delete these, too; trainings are for those who train.
-void requireMayEnd(const Access* access, const grpc::CallbackServerContext& context, const JobRecord& job) {
-  if (job.kind != kTrainShellPga || callerHolds(access, context, Role::kTrain)) return;
-  throw NotAllowed("job " + job.id + " is a training: cancelling or deleting it needs the role \"train\"");
+/// Who may start jobs that only answer may cancel and delete these, too; what publishes is for those who train.
+void requireMayEnd(const Access* access, const grpc::CallbackServerContext& context, const JobRunner& runner,
+                   const JobRecord& job) {
+  if (!runner.publishes(job.kind) || callerHolds(access, context, Role::kTrain)) return;
+  throw NotAllowed("job " + job.id + " publishes a model: cancelling or deleting it needs the role \"train\"");
 }
 
 using ResultCall = OutgoingStreamCall<v1::GetJobResultRequest, v1::GetJobResultResponse>;
@@ -124,7 +125,7 @@ grpc::ServerUnaryReactor* JobsService::Cancel(grpc::CallbackServerContext* conte
   return startUnary<v1::CancelJobRequest, v1::CancelJobResponse>(
       runtime_, runtime_.light, "Jobs.Cancel", context, request, response,
       [this, context](const auto& wanted, auto& answer, Call&) {
-        requireMayEnd(runtime_.access, *context, registry_.get(wanted.id()));
+        requireMayEnd(runtime_.access, *context, runner_, registry_.get(wanted.id()));
         toProto(runner_.cancel(wanted.id()), *answer.mutable_job());
       });
 }
@@ -141,7 +142,7 @@ grpc::ServerUnaryReactor* JobsService::Delete(grpc::CallbackServerContext* conte
   return startUnary<v1::DeleteJobRequest, v1::DeleteJobResponse>(
       runtime_, runtime_.light, "Jobs.Delete", context, request, response,
       [this, context](const auto& wanted, auto&, Call&) {
-        requireMayEnd(runtime_.access, *context, registry_.get(wanted.id()));
+        requireMayEnd(runtime_.access, *context, runner_, registry_.get(wanted.id()));
         runner_.forget(wanted.id());
       });
 }

@@ -1,14 +1,11 @@
-// After a stop no work begins that takes long on large meshes, whatever the solver was doing.
+// After a stop no work begins that takes long on large meshes, wherever a request was.
 #include <atomic>
 #include <catch2/catch.hpp>
 #include <functional>
-#include <set>
 #include <stop_token>
-#include <string>
+#include <string_view>
 
-#include "core/model/shell_pga_evaluation.h"
 #include "core/model/shell_pga_tasks.h"
-#include "core/model/shell_pga_training.h"
 #include "core/numerics/long_piece.h"
 #include "tests/support/calculus.h"
 #include "tests/support/models.h"
