@@ -30,6 +30,7 @@ class GeodesicCalculus {
   /// What stands for W in the comments below.
   const PairEnergy& energy() const { return energy_; }
   double bending() const { return energy_.bending(); }
+  const LengthAngleReconstruction& reconstruction() const { return *reconstruction_; }
 
   /// The discrete K-geodesic from a to b, the minimiser of the path energy (7): K + 1 shapes, the ends as given, K
   /// >= 1. warm: a path with the same number of shapes whose inner ones start the iteration, or empty. Throws

@@ -3,6 +3,7 @@
 #include <stop_token>
 
 #include "core/numerics/cholesky.h"
+#include "core/numerics/made_once.h"
 #include "core/shell/measures.h"
 
 namespace shaped {
@@ -11,7 +12,7 @@ namespace shaped {
 /// agree best across the hinges (the smallest eigenspace of the connection Laplacian over the faces), then positions by
 /// a Poisson solve. The start of Newton's method where shapes bend far; [WLT12], [FB11].
 ///
-/// Symbolic work is done once per topology; const calls may run in parallel. The topology must have one component.
+/// Symbolic work is done at the first call; const calls may run in parallel. The topology must have one component.
 class LengthAngleReconstruction {
  public:
   explicit LengthAngleReconstruction(TopologyPtr topology);
@@ -23,7 +24,7 @@ class LengthAngleReconstruction {
 
  private:
   TopologyPtr topology_;
-  CholeskyAnalysisPtr analysis_;                      ///< faces as nodes
+  MadeOnce<CholeskyAnalysis> analysis_;               ///< faces as nodes
   std::vector<std::array<std::int32_t, 2>> corners_;  ///< per hinge: in each face, the corner its edge starts from
 };
 

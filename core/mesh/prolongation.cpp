@@ -44,26 +44,30 @@ DetailSample sampleOf(const Vertices& shape, const Coarsening& coarsening, const
 
 }  // namespace
 
-std::optional<SparseRows> Prolongation::learnDetail(const Topology& fine, const Coarsening& coarsening,
-                                                    const Vertices& reference, const std::vector<Vertices>& training,
-                                                    const std::stop_token& stop) {
-  checkCoarsening(fine, coarsening);
-  requireValidShape(fine, reference, "reference");
-  checkTraining(fine, training);
-  const auto neighbours = nearestMarked(fine, reference, coarsening.kept, kLearningNeighbours);
-  if (stop.stop_requested()) return std::nullopt;
-  const ThinPlate plate(fine, coarsening, reference, neighbours);
+std::shared_ptr<const Prolongation> Prolongation::learn(const TopologyPtr& fine, Coarsening coarsening,
+                                                        const Vertices& reference,
+                                                        const std::vector<Vertices>& training,
+                                                        const std::stop_token& stop) {
+  checkCoarsening(*fine, coarsening);
+  requireValidShape(*fine, reference, "reference");
+  checkTraining(*fine, training);
+  const auto neighbours = nearestMarked(*fine, reference, coarsening.kept, kLearningNeighbours, stop);
+  if (stop.stop_requested()) return nullptr;
+  auto plate = ThinPlate::make(*fine, coarsening, reference, neighbours, stop);
+  if (!plate) return nullptr;
   std::vector<DetailSample> samples;
   for (const auto& shape : training) {
-    if (stop.stop_requested()) return std::nullopt;
-    samples.push_back(sampleOf(shape, coarsening, plate));
+    if (stop.stop_requested()) return nullptr;
+    samples.push_back(sampleOf(shape, coarsening, *plate));
   }
-  return fitDetail(neighbours, sampleOf(reference, coarsening, plate), samples, stop);
+  auto detail = fitDetail(neighbours, sampleOf(reference, coarsening, *plate), samples, stop);
+  if (!detail) return nullptr;
+  return std::shared_ptr<const Prolongation>(
+      new Prolongation(std::move(coarsening), std::move(plate), std::move(*detail)));
 }
 
-Prolongation::Prolongation(const TopologyPtr& fine, Coarsening coarsening, const Vertices& reference,
-                           const std::vector<Vertices>& training)
-    : Prolongation(fine, coarsening, reference, *learnDetail(*fine, coarsening, reference, training)) {}
+Prolongation::Prolongation(Coarsening coarsening, std::shared_ptr<const ThinPlate> plate, SparseRows detail)
+    : coarsening_(std::move(coarsening)), plate_(std::move(plate)), detail_(std::move(detail)) {}
 
 Prolongation::Prolongation(const TopologyPtr& fine, Coarsening coarsening, const Vertices& reference, SparseRows detail)
     : coarsening_(std::move(coarsening)), detail_(std::move(detail)) {
@@ -74,7 +78,7 @@ Prolongation::Prolongation(const TopologyPtr& fine, Coarsening coarsening, const
                                      ", want " + std::to_string(fine->vertexCount()) + " x " +
                                      std::to_string(2 * coarsening_.coarse->vertexCount()));
   const auto neighbours = nearestMarked(*fine, reference, coarsening_.kept, kPlateNeighbours);
-  plate_ = std::make_shared<const ThinPlate>(*fine, coarsening_, reference, neighbours);
+  plate_ = ThinPlate::make(*fine, coarsening_, reference, neighbours);
 }
 
 Vertices Prolongation::prolongate(const Vertices& coarse) const {

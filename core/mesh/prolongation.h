@@ -1,7 +1,6 @@
 #pragma once
 
 #include <memory>
-#include <optional>
 #include <stop_token>
 #include <vector>
 
@@ -28,19 +27,15 @@ namespace shaped {
 ///     0.04          0.50        0.09    0.07   thin plate and learned correction
 class Prolongation {
  public:
-  /// reference: V x 3, valid. training: any number of V x 3 shapes to learn from, in any position. About 2 s for 72
-  /// shapes of 13,380 vertices.
+  /// Learns the correction. reference: V x 3, valid. training: any number of V x 3 shapes to learn from, in any
+  /// position. About 1 s for 72 shapes of 13,380 vertices. Null once the stop token has fired.
   /// Throws InvalidInput naming `coarsening`, `reference` or `training[i]`.
-  Prolongation(const TopologyPtr& fine, Coarsening coarsening, const Vertices& reference,
-               const std::vector<Vertices>& training = {});
+  static std::shared_ptr<const Prolongation> learn(const TopologyPtr& fine, Coarsening coarsening,
+                                                   const Vertices& reference, const std::vector<Vertices>& training,
+                                                   const std::stop_token& stop = {});
 
   /// From stored parts: `detail` as another Prolongation of the same fine mesh, coarsening and reference had it.
   Prolongation(const TopologyPtr& fine, Coarsening coarsening, const Vertices& reference, SparseRows detail);
-
-  /// The detail() of a Prolongation with these arguments; nothing once the stop token has fired.
-  static std::optional<SparseRows> learnDetail(const Topology& fine, const Coarsening& coarsening,
-                                               const Vertices& reference, const std::vector<Vertices>& training,
-                                               const std::stop_token& stop = {});
 
   /// coarse: C x 3. Throws InvalidInput naming `coarse` when it has the wrong size or is not finite.
   Vertices prolongate(const Vertices& coarse) const;
@@ -53,6 +48,8 @@ class Prolongation {
   std::size_t bytes() const { return plate_->bytes() + bytesOf(detail_); }
 
  private:
+  Prolongation(Coarsening coarsening, std::shared_ptr<const ThinPlate> plate, SparseRows detail);
+
   Coarsening coarsening_;
   std::shared_ptr<const ThinPlate> plate_;
   SparseRows detail_;

@@ -1,43 +1,45 @@
 #include "core/mesh/surface_neighbours.h"
 
+#include <algorithm>
 #include <functional>
-#include <limits>
 #include <queue>
-#include <utility>
+#include <tuple>
 
 namespace shaped {
 namespace {
 
-constexpr double kFar = std::numeric_limits<double>::infinity();
-
-/// Dijkstra's method from one vertex after another, each ended as soon as enough marks are met.
+/// Dijkstra's method from all marks at once, where every vertex is met by the `count` marks that come first: the way
+/// from a mark to a vertex leads only over vertices among whose nearest marks it is too.
 class NeighbourSearch {
  public:
-  NeighbourSearch(const Topology& topology, const Vertices& shape, const std::vector<std::int32_t>& marked)
-      : spokes_(static_cast<std::size_t>(topology.vertexCount())),
-        mark_(static_cast<std::size_t>(topology.vertexCount()), -1),
-        distance_(static_cast<std::size_t>(topology.vertexCount()), kFar) {
+  NeighbourSearch(const Topology& topology, const Vertices& shape, int count)
+      : count_(static_cast<std::size_t>(count)),
+        first_(static_cast<std::size_t>(topology.vertexCount()) + 1, 0),
+        spokes_(2 * topology.edges().size()),
+        found_(static_cast<std::size_t>(topology.vertexCount())) {
+    for (const auto& edge : topology.edges())
+      for (const auto end : edge) ++first_[end + 1];
+    for (std::size_t v = 1; v < first_.size(); ++v) first_[v] += first_[v - 1];
+    auto next = first_;
     for (const auto& [a, b] : topology.edges()) {
       const double length = (shape.row(a) - shape.row(b)).norm();
-      spokes_[a].push_back({b, length});
-      spokes_[b].push_back({a, length});
+      spokes_[next[a]++] = {b, length};
+      spokes_[next[b]++] = {a, length};
     }
-    for (std::size_t m = 0; m < marked.size(); ++m) mark_[marked[m]] = static_cast<std::int32_t>(m);
   }
 
-  SurfaceNeighbours operator()(std::int32_t start, int count) {
-    SurfaceNeighbours found;
-    reach(start, 0);
-    while (!front_.empty() && static_cast<int>(found.size()) < count) {
-      const auto [distance, v] = front_.top();
+  std::vector<SurfaceNeighbours> run(const std::vector<std::int32_t>& marked, const std::stop_token& stop) {
+    for (std::size_t m = 0; m < marked.size(); ++m) front_.emplace(0, static_cast<std::int32_t>(m), marked[m]);
+    while (!front_.empty()) {
+      if (stop.stop_requested()) return {};
+      const auto [distance, mark, v] = front_.top();
       front_.pop();
-      if (distance > distance_[v]) continue;  // reached on a shorter way since
-      if (mark_[v] >= 0) found.push_back({mark_[v], distance});
-      for (const auto& [next, length] : spokes_[v])
-        if (distance + length < distance_[next]) reach(next, distance + length);
+      if (!takes(v, mark)) continue;
+      found_[v].push_back({mark, distance});
+      for (auto s = first_[v]; s < first_[v + 1]; ++s)
+        if (takes(spokes_[s].to, mark)) front_.emplace(distance + spokes_[s].length, mark, spokes_[s].to);
     }
-    clear();
-    return found;
+    return std::move(found_);
   }
 
  private:
@@ -45,35 +47,28 @@ class NeighbourSearch {
     std::int32_t to;
     double length;
   };
-  using Reached = std::pair<double, std::int32_t>;
+  using Reached = std::tuple<double, std::int32_t, std::int32_t>;  ///< distance, mark, vertex
 
-  void reach(std::int32_t v, double distance) {
-    if (distance_[v] == kFar) touched_.push_back(v);
-    distance_[v] = distance;
-    front_.emplace(distance, v);
+  /// Has the vertex room for the mark, and has not met it on a shorter way?
+  bool takes(std::int32_t v, std::int32_t mark) const {
+    const auto& found = found_[v];
+    return found.size() < count_ &&
+           std::none_of(found.begin(), found.end(), [&](const auto& neighbour) { return neighbour.mark == mark; });
   }
 
-  void clear() {
-    for (const auto v : touched_) distance_[v] = kFar;
-    touched_.clear();
-    front_ = {};
-  }
-
-  std::vector<std::vector<Spoke>> spokes_;
-  std::vector<std::int32_t> mark_;
-  std::vector<double> distance_;
-  std::vector<std::int32_t> touched_;
+  std::size_t count_;
+  std::vector<std::size_t> first_;  ///< of a vertex's spokes, and the end
+  std::vector<Spoke> spokes_;
+  std::vector<SurfaceNeighbours> found_;
   std::priority_queue<Reached, std::vector<Reached>, std::greater<>> front_;
 };
 
 }  // namespace
 
 std::vector<SurfaceNeighbours> nearestMarked(const Topology& topology, const Vertices& shape,
-                                             const std::vector<std::int32_t>& marked, int count) {
-  NeighbourSearch search(topology, shape, marked);
-  std::vector<SurfaceNeighbours> result(static_cast<std::size_t>(topology.vertexCount()));
-  for (std::int32_t v = 0; v < topology.vertexCount(); ++v) result[v] = search(v, count);
-  return result;
+                                             const std::vector<std::int32_t>& marked, int count,
+                                             const std::stop_token& stop) {
+  return NeighbourSearch(topology, shape, count).run(marked, stop);
 }
 
 }  // namespace shaped

@@ -6,6 +6,7 @@
 
 #include "core/mesh/quality.h"
 #include "core/numerics/error.h"
+#include "core/numerics/long_piece.h"
 
 namespace shaped {
 namespace {
@@ -55,25 +56,78 @@ SurfaceNeighbours blendWeights(const SurfaceNeighbours& nearest) {
   return weights;
 }
 
-/// V x 2C: the Laplacian of the mapped reference from the frame vectors.
+/// Sums up one row after another of a sparse matrix.
+class RowByRow {
+ public:
+  RowByRow(Eigen::Index rows, Eigen::Index columns) : matrix_(rows, columns), row_(Eigen::VectorXd::Zero(columns)) {}
+
+  void add(std::int32_t column, double value) {
+    if (row_[column] == 0) columns_.push_back(column);  // perhaps again, where the sum came out as zero
+    row_[column] += value;
+  }
+
+  void finishRow(Eigen::Index row) {
+    std::sort(columns_.begin(), columns_.end());
+    columns_.erase(std::unique(columns_.begin(), columns_.end()), columns_.end());
+    matrix_.startVec(row);
+    for (const auto column : columns_) {
+      matrix_.insertBack(row, column) = row_[column];
+      row_[column] = 0;
+    }
+    columns_.clear();
+  }
+
+  SparseRows take() {
+    matrix_.finalize();
+    return std::move(matrix_);
+  }
+
+ private:
+  SparseRows matrix_;
+  Eigen::VectorXd row_;
+  std::vector<std::int32_t> columns_;  ///< of the row's entries
+};
+
+/// What holds a vertex to its neighbours.
+struct Spoke {
+  std::int32_t to;
+  double weight;
+};
+
+std::vector<std::vector<Spoke>> spokesOf(const Topology& topology, const std::vector<double>& edge_weights) {
+  std::vector<std::vector<Spoke>> spokes(static_cast<std::size_t>(topology.vertexCount()));
+  for (std::size_t e = 0; e < edge_weights.size(); ++e) {
+    const auto [a, b] = topology.edges()[e];
+    spokes[a].push_back({b, edge_weights[e]});
+    spokes[b].push_back({a, edge_weights[e]});
+  }
+  return spokes;
+}
+
+/// V x 2C: the Laplacian of the mapped reference from the frame vectors. Each edge is mapped by the mean of the maps at
+/// its ends. Unfinished once the stop token has fired.
 SparseRows mappedLaplacian(const Topology& fine, const Vertices& reference, const std::vector<double>& edge_weights,
                            const std::vector<SurfaceNeighbours>& neighbours,
-                           const std::vector<GradientStencil>& stencils) {
-  Triplets triplets;
-  for (std::size_t e = 0; e < fine.edges().size(); ++e) {
-    const auto [a, b] = fine.edges()[e];
-    const Eigen::Vector3d edge = (reference.row(a) - reference.row(b)).transpose();
-    for (const auto end : {a, b})
-      for (const auto& [mark, weight] : blendWeights(neighbours[end]))
-        for (const auto& term : stencils[mark].terms) {
-          const double pull = 0.5 * edge_weights[e] * weight * term.weight.dot(edge);
-          triplets.emplace_back(a, term.row, pull);
-          triplets.emplace_back(b, term.row, -pull);
-        }
+                           const std::vector<GradientStencil>& stencils, const std::stop_token& stop) {
+  std::vector<SurfaceNeighbours> blends;
+  for (const auto& nearest : neighbours) blends.push_back(blendWeights(nearest));
+  RowByRow rows(fine.vertexCount(), 2 * static_cast<Eigen::Index>(stencils.size()));
+  const auto add = [&](std::int32_t mapped_at, const Eigen::Vector3d& vector) {
+    for (const auto& [mark, weight] : blends[mapped_at])
+      for (const auto& term : stencils[mark].terms) rows.add(term.row, weight * term.weight.dot(vector));
+  };
+  const auto spokes = spokesOf(fine, edge_weights);
+  for (std::int32_t a = 0; a < fine.vertexCount() && !stop.stop_requested(); ++a) {
+    Eigen::Vector3d own = Eigen::Vector3d::Zero();
+    for (const auto& [b, weight] : spokes[a]) {
+      const Eigen::Vector3d pull = 0.5 * weight * (reference.row(a) - reference.row(b)).transpose();
+      own += pull;
+      add(b, pull);
+    }
+    add(a, own);
+    rows.finishRow(a);
   }
-  SparseRows result(fine.vertexCount(), 2 * static_cast<Eigen::Index>(stencils.size()));
-  result.setFromTriplets(triplets.begin(), triplets.end());
-  return result;
+  return rows.take();
 }
 
 SparseRows laplacian(const Topology& topology, const std::vector<double>& edge_weights) {
@@ -108,41 +162,52 @@ SparseRows spreading(const std::vector<std::int32_t>& kept, Eigen::Index count) 
 
 }  // namespace
 
-ThinPlate::ThinPlate(const Topology& fine, const Coarsening& coarsening, const Vertices& reference,
-                     const std::vector<SurfaceNeighbours>& neighbours)
-    : kept_(coarsening.kept) {
+ThinPlate::ThinPlate(const Topology& fine, const Coarsening& coarsening) : kept_(coarsening.kept) {
   std::vector<std::int32_t> all(static_cast<std::size_t>(fine.vertexCount()));
   std::iota(all.begin(), all.end(), 0);
   std::set_difference(all.begin(), all.end(), kept_.begin(), kept_.end(), std::back_inserter(free_));
-  if (free_.empty()) return;
+}
 
+std::shared_ptr<const ThinPlate> ThinPlate::make(const Topology& fine, const Coarsening& coarsening,
+                                                 const Vertices& reference,
+                                                 const std::vector<SurfaceNeighbours>& neighbours,
+                                                 const std::stop_token& stop) {
+  const std::shared_ptr<ThinPlate> plate(new ThinPlate(fine, coarsening));
+  const bool whole = plate->free_.empty() || plate->assemble(fine, coarsening, reference, neighbours, stop);
+  return whole ? plate : nullptr;
+}
+
+bool ThinPlate::assemble(const Topology& fine, const Coarsening& coarsening, const Vertices& reference,
+                         const std::vector<SurfaceNeighbours>& neighbours, const std::stop_token& stop) {
+  if (stop.stop_requested()) return false;
   const auto weights = edgeWeights(fine, reference);
   const auto stencils = gradientStencils(*coarsening.coarse, restrictTo(coarsening, reference));
   const SparseRows whole = laplacian(fine, weights);
-  const SparseRows mapped = mappedLaplacian(fine, reference, weights, neighbours, stencils);
+  const SparseRows mapped = mappedLaplacian(fine, reference, weights, neighbours, stencils, stop);
+  if (stop.stop_requested()) return false;
+  const LongPiece piece("products of a thin plate");
   const SparseRows free_rows = picking(free_, fine.vertexCount());
   const SparseRows weighted = free_rows * whole * inverseAreas(fine, reference).asDiagonal();
   const SparseRows hessian = weighted * whole;  // of |L x - d|^2 / 2: free x V
+  if (stop.stop_requested()) return false;
   const SparseRows from_reference = weighted * mapped, from_kept = hessian * spreading(kept_, fine.vertexCount());
+  if (stop.stop_requested()) return false;
   pull_ = from_reference - from_kept;
-  factor_.compute(Eigen::SparseMatrix<double>(hessian * SparseRows(free_rows.transpose())));
-  if (factor_.info() != Eigen::Success)
-    throw InvalidInput("reference", "has triangles too thin to carry detail over from the coarse mesh; repair it");
+  if (factor_.compute(hessian * SparseRows(free_rows.transpose()), stop)) return true;
+  if (stop.stop_requested()) return false;
+  throw InvalidInput("reference", "has triangles too thin to carry detail over from the coarse mesh; repair it");
 }
 
 std::size_t ThinPlate::bytes() const {
   if (free_.empty()) return 0;
-  return bytesOf(pull_) + bytesOf(factor_.matrixL().nestedExpression());
+  return bytesOf(pull_) + factor_.bytes();
 }
 
 Vertices ThinPlate::solve(const Vertices& frame) const {
   Vertices shape(static_cast<Eigen::Index>(kept_.size() + free_.size()), 3);
   shape(kept_, Eigen::all) = frame.topRows(static_cast<Eigen::Index>(kept_.size()));
   if (free_.empty()) return shape;
-  using Columns = Eigen::Matrix<double, Eigen::Dynamic, 3>;
-  const Columns pull = pull_ * frame;
-  const Columns between = factor_.solve(pull);  // Eigen 3.4 solves wrongly straight into indexed rows
-  shape(free_, Eigen::all) = between;
+  shape(free_, Eigen::all) = factor_.solve(pull_ * frame);
   return shape;
 }
 

@@ -1,11 +1,13 @@
 #pragma once
 
-#include <Eigen/SparseCholesky>
 #include <Eigen/SparseCore>
+#include <memory>
+#include <stop_token>
 
 #include "core/mesh/coarse_frame.h"
 #include "core/mesh/coarsening.h"
 #include "core/mesh/surface_neighbours.h"
+#include "core/numerics/scalar_cholesky.h"
 
 namespace shaped {
 
@@ -30,10 +32,13 @@ std::size_t bytesOf(const Eigen::SparseMatrix<double, options>& matrix) {
 /// hard constraints, the Poisson solution has a cusp at each (half as much error again on held-out bodies).
 class ThinPlate {
  public:
-  /// neighbours: of each fine vertex among the kept ones, seven or more where the mesh has as many.
-  /// Throws InvalidInput naming `reference` when its triangles are too thin to factorise.
-  ThinPlate(const Topology& fine, const Coarsening& coarsening, const Vertices& reference,
-            const std::vector<SurfaceNeighbours>& neighbours);
+  /// neighbours: of each fine vertex among the kept ones, seven or more where the mesh has as many; more do not count.
+  /// Null once the stop token has fired. Throws InvalidInput naming `reference` when its triangles are too thin to
+  /// factorise.
+  static std::shared_ptr<const ThinPlate> make(const Topology& fine, const Coarsening& coarsening,
+                                               const Vertices& reference,
+                                               const std::vector<SurfaceNeighbours>& neighbours,
+                                               const std::stop_token& stop = {});
 
   /// frame: frameVectors of a coarse shape. V x 3. May be called from several threads at once.
   Vertices solve(const Vertices& frame) const;
@@ -42,9 +47,14 @@ class ThinPlate {
   std::size_t bytes() const;
 
  private:
+  ThinPlate(const Topology& fine, const Coarsening& coarsening);
+  /// False once the stop token has fired.
+  bool assemble(const Topology& fine, const Coarsening& coarsening, const Vertices& reference,
+                const std::vector<SurfaceNeighbours>& neighbours, const std::stop_token& stop);
+
   std::vector<std::int32_t> kept_, free_;  ///< fine vertices
   SparseRows pull_;                        ///< free x 2C: the right-hand side from the frame vectors
-  Eigen::SimplicialLDLT<Eigen::SparseMatrix<double>> factor_;
+  ScalarCholesky factor_;
 };
 
 }  // namespace shaped

@@ -62,7 +62,7 @@ class FoldEvaluator {
     auto pga = principalVariations(calculus_, spider.solution, largest, {100, 1e-8, options_.stop});
     outcome += pga;
     if (options_.stop.stop_requested()) return outcome;
-    const Submanifold submanifold(std::make_shared<GeodesicCalculus>(calculus_),
+    const Submanifold submanifold(model_.submanifold().calculusPtr(),
                                   std::make_shared<ShellPga>(std::move(pga.solution)));
     const auto linear = linearPca(kept);
     for (const auto& shape : left_out)
@@ -115,6 +115,8 @@ std::vector<double> compactness(const Eigen::VectorXd& eigenvalues, const std::v
 double specificity(const ShellPgaModel& model, const std::vector<Vertices>& shapes, int modes,
                    const EvaluationOptions& options) {
   const auto& calculus = model.submanifold().calculus();
+  std::vector<ShellMeasures> known;
+  for (const auto& shape : shapes) known.push_back(measure(calculus.topology(), shape));
   std::mt19937 random(options.seed);
   std::normal_distribution<double> normal;
   double sum = 0;
@@ -123,13 +125,11 @@ double specificity(const ShellPgaModel& model, const std::vector<Vertices>& shap
     for (int j = 0; j < modes; ++j) y[j] = normal(random) * std::sqrt(std::max(model.pga().eigenvalues[j], 0.0));
     SubmanifoldOptions submanifold_options;
     submanifold_options.stop = options.stop;
-    const auto shape =
-        model.submanifold().shapeOf(model.submanifold().pointOf(y), submanifold_options).solution.shape;
+    const auto shape = model.submanifold().shapeOf(model.submanifold().pointOf(y), submanifold_options).solution.shape;
     const auto measures = measure(calculus.topology(), shape);
     double nearest = std::numeric_limits<double>::infinity();
-    for (const auto& known : shapes)
-      nearest = std::min(
-          nearest, shellEnergy(calculus.topology(), measure(calculus.topology(), known), measures, calculus.bending()));
+    for (const auto& other : known)
+      nearest = std::min(nearest, shellEnergy(calculus.topology(), other, measures, calculus.bending()));
     sum += std::sqrt(nearest);
   }
   return sum / std::max(1, options.specificity_samples);
@@ -143,8 +143,8 @@ std::size_t foldsOf(const EvaluationOptions& options, std::size_t shapes) {
 std::vector<int> checkedModes(const ShellPgaModel& model, std::size_t shapes, const EvaluationOptions& options) {
   if (shapes < 3) throw InvalidInput("shapes", "evaluation needs at least three");
   if (options.folds < 0 || options.folds == 1 || options.folds > static_cast<int>(shapes))
-    throw InvalidInput("folds", std::to_string(options.folds) + ", want 0 (leave one out) or 2 to " +
-                                    std::to_string(shapes));
+    throw InvalidInput("folds",
+                       std::to_string(options.folds) + ", want 0 (leave one out) or 2 to " + std::to_string(shapes));
   const auto folds = foldsOf(options, shapes);
   const auto smallest_training = static_cast<int>(shapes - (shapes + folds - 1) / folds);
   if (smallest_training < 2)
@@ -199,8 +199,7 @@ class Evaluation {
            0.1 + 0.8 * static_cast<double>(state_.folds) / folds);
     auto sums = state_.sums;
     const FoldEvaluator evaluator(model_, coarse_, *state_.spider, sums.modes, options_);
-    const auto outcome =
-        evaluator.run(static_cast<std::size_t>(state_.folds), static_cast<std::size_t>(folds), sums);
+    const auto outcome = evaluator.run(static_cast<std::size_t>(state_.folds), static_cast<std::size_t>(folds), sums);
     if (stopped()) return;
     state_.outcome += outcome;
     state_.sums = std::move(sums);

@@ -9,10 +9,13 @@
 namespace shaped {
 namespace {
 
-std::shared_ptr<const Submanifold> makeSubmanifold(const std::shared_ptr<const ShellPgaParts>& parts) {
-  auto calculus = std::make_shared<GeodesicCalculus>(std::make_shared<ShellStructure>(parts->coarsening.coarse),
-                                                     PairEnergy(parts->bending, parts->symmetry));
-  return std::make_shared<Submanifold>(std::move(calculus), std::shared_ptr<const ShellPga>(parts, &parts->pga));
+std::shared_ptr<const GeodesicCalculus> calculusOf(const ShellPgaParts& parts) {
+  return std::make_shared<GeodesicCalculus>(std::make_shared<ShellStructure>(parts.coarsening.coarse),
+                                            PairEnergy(parts.bending, parts.symmetry));
+}
+
+std::shared_ptr<const Prolongation> prolongationOf(const ShellPgaParts& parts) {
+  return std::make_shared<const Prolongation>(parts.topology, parts.coarsening, parts.reference, parts.detail);
 }
 
 /// The largest triangle around a coarse vertex: its frame is the steadiest.
@@ -41,13 +44,29 @@ std::size_t bytesOf(const TopologyPtr& topology) {
 }  // namespace
 
 ShellPgaModel::ShellPgaModel(ShellPgaParts parts)
-    : parts_(std::make_shared<const ShellPgaParts>(std::move(parts))),
-      submanifold_(makeSubmanifold(parts_)),
-      prolongation_(std::make_shared<const Prolongation>(parts_->topology, parts_->coarsening, parts_->reference,
-                                                         parts_->detail)),
+    : ShellPgaModel(std::make_shared<const ShellPgaParts>(std::move(parts)), nullptr, nullptr) {}
+
+ShellPgaModel::ShellPgaModel(ShellPgaParts parts, std::shared_ptr<const GeodesicCalculus> calculus,
+                             std::shared_ptr<const Prolongation> prolongation)
+    : ShellPgaModel(std::make_shared<const ShellPgaParts>(std::move(parts)), std::move(calculus),
+                    std::move(prolongation)) {}
+
+ShellPgaModel::ShellPgaModel(std::shared_ptr<const ShellPgaParts> parts,
+                             std::shared_ptr<const GeodesicCalculus> calculus,
+                             std::shared_ptr<const Prolongation> prolongation)
+    : parts_(std::move(parts)),
+      submanifold_(std::make_shared<const Submanifold>(calculus ? std::move(calculus) : calculusOf(*parts_),
+                                                       std::shared_ptr<const ShellPga>(parts_, &parts_->pga))),
+      prolongation_(prolongation ? std::move(prolongation) : prolongationOf(*parts_)),
       mean_(prolongation_->prolongate(parts_->pga.mean)),
       coarse_reference_(restrictTo(parts_->coarsening, parts_->reference)),
       coarse_template_(restrictTo(parts_->coarsening, parts_->template_shape)) {}
+
+ShellPgaModelPtr ShellPgaModel::withRecord(const TrainingRecord& record) const {
+  auto parts = *parts_;
+  parts.training = record;
+  return std::make_shared<const ShellPgaModel>(std::move(parts), submanifold_->calculusPtr(), prolongation_);
+}
 
 std::size_t ShellPgaModel::bytes() const {
   std::size_t numbers = 0;
@@ -124,24 +143,26 @@ std::vector<MarkerSite> ShellPgaModel::sitesOf(const MarkerSet& markers) const {
   return sites;
 }
 
-const ShellStructurePtr& ShellPgaModel::fineStructure() const {
-  std::call_once(fine_structure_once_,
-                 [this] { fine_structure_ = std::make_shared<ShellStructure>(parts_->topology); });
-  return fine_structure_;
+ShellStructurePtr ShellPgaModel::fineStructure(const std::stop_token& stop) const {
+  return fine_structure_.get(
+      stop, [this](const std::stop_token& until) { return ShellStructure::make(parts_->topology, until); });
 }
 
-const std::shared_ptr<const Submanifold>& ShellPgaModel::fineSubmanifold() const {
-  std::call_once(fine_submanifold_once_, [this] {
-    ShellPga fine = parts_->pga;  // shares the variations
-    fine.mean = mean_;
-    const auto refine = [prolongation = prolongation_](const Vertices& coarse) {
-      return prolongation->prolongate(coarse);
-    };
-    auto calculus = std::make_shared<GeodesicCalculus>(fineStructure(), PairEnergy(parts_->bending, parts_->symmetry));
-    fine_submanifold_ =
-        std::make_shared<Submanifold>(std::move(calculus), std::make_shared<ShellPga>(std::move(fine)), refine);
-  });
-  return fine_submanifold_;
+std::shared_ptr<const Submanifold> ShellPgaModel::fineSubmanifold(const std::stop_token& stop) const {
+  return fine_submanifold_.get(stop, [this](const std::stop_token& until) { return makeFineSubmanifold(until); });
+}
+
+std::shared_ptr<const Submanifold> ShellPgaModel::makeFineSubmanifold(const std::stop_token& stop) const {
+  auto structure = fineStructure(stop);
+  if (!structure) return nullptr;
+  ShellPga fine = parts_->pga;  // shares the variations
+  fine.mean = mean_;
+  const auto refine = [prolongation = prolongation_](const Vertices& coarse) {
+    return prolongation->prolongate(coarse);
+  };
+  auto calculus =
+      std::make_shared<GeodesicCalculus>(std::move(structure), PairEnergy(parts_->bending, parts_->symmetry));
+  return std::make_shared<Submanifold>(std::move(calculus), std::make_shared<ShellPga>(std::move(fine)), refine);
 }
 
 }  // namespace shaped

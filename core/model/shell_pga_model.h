@@ -1,13 +1,14 @@
 #pragma once
 
 #include <memory>
-#include <mutex>
 #include <optional>
+#include <stop_token>
 
 #include "core/markers/marker_set.h"
 #include "core/mesh/anchor.h"
 #include "core/mesh/prolongation.h"
 #include "core/mocap/marker_tracker.h"
+#include "core/numerics/made_once.h"
 #include "core/statistics/submanifold.h"
 
 namespace shaped {
@@ -40,6 +41,12 @@ struct ShellPgaParts {
 class ShellPgaModel {
  public:
   explicit ShellPgaModel(ShellPgaParts parts);
+  /// From parts of which there are a calculus on the coarse mesh and a prolongation already: nothing is factorised.
+  ShellPgaModel(ShellPgaParts parts, std::shared_ptr<const GeodesicCalculus> calculus,
+                std::shared_ptr<const Prolongation> prolongation);
+
+  /// The same model with another record of its training.
+  std::shared_ptr<const ShellPgaModel> withRecord(const TrainingRecord& record) const;
 
   const Topology& topology() const { return *parts_->topology; }
   const ShellPgaParts& parts() const { return *parts_; }
@@ -64,13 +71,17 @@ class ShellPgaModel {
   /// Where the markers sit on the coarse mesh. Throws InvalidInput naming markers[i].
   std::vector<MarkerSite> sitesOf(const MarkerSet& markers) const;
 
-  /// Sparsity and symbolic factorisation at full resolution, made at the first call.
-  const ShellStructurePtr& fineStructure() const;
+  /// Sparsity and symbolic factorisation at full resolution, made at the first call. Null once the stop token has
+  /// fired.
+  ShellStructurePtr fineStructure(const std::stop_token& stop = {}) const;
   /// The submanifold of the prolongated mean and variations at full resolution, made at the first call. Its pga() has
-  /// the coarse variations; it may outlive the model.
-  const std::shared_ptr<const Submanifold>& fineSubmanifold() const;
+  /// the coarse variations; it may outlive the model. Null once the stop token has fired.
+  std::shared_ptr<const Submanifold> fineSubmanifold(const std::stop_token& stop = {}) const;
 
  private:
+  ShellPgaModel(std::shared_ptr<const ShellPgaParts> parts, std::shared_ptr<const GeodesicCalculus> calculus,
+                std::shared_ptr<const Prolongation> prolongation);
+  std::shared_ptr<const Submanifold> makeFineSubmanifold(const std::stop_token& stop) const;
   Anchor anchorOfPoint(const Eigen::Vector3d& point) const;
   MarkerSite siteAt(const Anchor& anchor, const Eigen::Vector3d& marker) const;
 
@@ -79,9 +90,8 @@ class ShellPgaModel {
   std::shared_ptr<const Prolongation> prolongation_;  ///< shared with the fine submanifold
   Vertices mean_;
   Vertices coarse_reference_, coarse_template_;
-  mutable std::once_flag fine_structure_once_, fine_submanifold_once_;
-  mutable ShellStructurePtr fine_structure_;
-  mutable std::shared_ptr<const Submanifold> fine_submanifold_;
+  MadeOnce<ShellStructure> fine_structure_;
+  MadeOnce<Submanifold> fine_submanifold_;
 };
 
 using ShellPgaModelPtr = std::shared_ptr<const ShellPgaModel>;

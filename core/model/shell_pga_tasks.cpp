@@ -40,7 +40,8 @@ std::vector<AnchorTarget> targetsOf(const ShellPgaModel& model, const std::vecto
 /// min over s of W[s, prior] at full resolution with the handle vertices where they are wanted.
 Solved<Vertices> finishAtFullResolution(const ShellPgaModel& model, const std::vector<Handle>& handles,
                                         const Vertices& prior, Vertices start, std::stop_token stop) {
-  const auto& structure = model.fineStructure();
+  const auto structure = model.fineStructure(stop);
+  if (!structure) return {std::move(start), {Termination::kCancelled, 0, 0}};
   ShellObjective objective(structure, model.parts().bending);
   objective.addDeformed(measure(model.topology(), prior), 1);
   Pins pins(model.topology().vertexCount());
@@ -57,11 +58,12 @@ Solved<Vertices> finishAtFullResolution(const ShellPgaModel& model, const std::v
 Vertices solveAtFullResolution(const ShellPgaModel& model, const SubmanifoldPoint& coefficients,
                                const Vertices& coarse_local, const std::stop_token& stop, Outcome& outcome) {
   Vertices start = model.prolongate(coarse_local);
-  if (stop.stop_requested()) {
+  const auto fine = model.fineSubmanifold(stop);
+  if (!fine) {
     outcome.termination = Termination::kCancelled;
     return start;
   }
-  auto solved = model.fineSubmanifold()->shapeOf(coefficients, submanifoldOptions(0, stop), &start);
+  auto solved = fine->shapeOf(coefficients, submanifoldOptions(0, stop), &start);
   outcome += solved;
   return std::move(solved.solution.shape);
 }

@@ -30,11 +30,11 @@ void requireDistinct(const std::vector<Vertices>& coarse, const std::stop_token&
                            "is shapes[" + std::to_string(j) + "] up to a rigid motion; remove one of them");
 }
 
-/// The training shape nearest to the mean lends its detail.
-std::size_t nearestToMean(const GeodesicCalculus& calculus, const Spider& spider) {
+/// The training shape nearest to the mean lends its detail. Any of them once the stop token has fired.
+std::size_t nearestToMean(const GeodesicCalculus& calculus, const Spider& spider, const std::stop_token& stop) {
   std::size_t nearest = 0;
   double least = std::numeric_limits<double>::infinity();
-  for (std::size_t i = 0; i < spider.arms.size(); ++i) {
+  for (std::size_t i = 0; i < spider.arms.size() && !stop.stop_requested(); ++i) {
     const double energy = calculus.pathEnergy(spider.arms[i]);
     if (energy < least) least = energy, nearest = i;
   }
@@ -70,9 +70,8 @@ Solved<Spider> trainMean(const GeodesicCalculus& calculus, const std::vector<Ver
                                   {}};
   if (checkpoint)
     mean_options.on_iterate = [&](const Outcome& outcome, const std::function<Spider()>& iterate) {
-      checkpoint([&] {
-        return ShellPgaCheckpoint{state.training, state.coarsening, iterate(), soFar(outcome), false, {}};
-      });
+      checkpoint(
+          [&] { return ShellPgaCheckpoint{state.training, state.coarsening, iterate(), soFar(outcome), false, {}}; });
     };
   auto mean = frechetMean(calculus, coarse, mean_options);
   return {std::move(mean.solution), soFar(mean)};
@@ -154,9 +153,10 @@ Solved<ShellPgaModelPtr> trainShellPga(const ShellPgaTrainingSet& set, const She
   }
   requireDistinct(coarse, stop);
 
-  const GeodesicCalculus calculus(std::make_shared<ShellStructure>(parts.coarsening.coarse),
-                                  {parts.bending, parts.symmetry});
-  const auto spider = trainMean(calculus, coarse, options, state, resumption.checkpoint, progress, stop);
+  const auto structure = ShellStructure::make(parts.coarsening.coarse, stop);
+  if (!structure) return {nullptr, cancelled};
+  const auto calculus = std::make_shared<const GeodesicCalculus>(structure, PairEnergy(parts.bending, parts.symmetry));
+  const auto spider = trainMean(*calculus, coarse, options, state, resumption.checkpoint, progress, stop);
   parts.training = {static_cast<int>(set.shapes.size()), spider, {}, 0};
   if (spider.termination == Termination::kCancelled) return {nullptr, cancelled};
   state.spider = spider.solution;
@@ -165,19 +165,19 @@ Solved<ShellPgaModelPtr> trainShellPga(const ShellPgaTrainingSet& set, const She
   keep();
   if (stop.stop_requested()) return {nullptr, cancelled};
   report(progress, "principal variations", 0.75);
-  auto pga = trainVariations(calculus, spider.solution, options.modes, state, resumption.checkpoint, progress, stop);
+  auto pga = trainVariations(*calculus, spider.solution, options.modes, state, resumption.checkpoint, progress, stop);
   if (stop.stop_requested()) return {nullptr, cancelled};
   parts.training.variations = pga;
   parts.pga = std::move(pga.solution);
 
   report(progress, "prolongation", 0.9);
-  parts.reference = set.shapes[nearestToMean(calculus, spider.solution)];
-  auto detail = Prolongation::learnDetail(*set.topology, parts.coarsening, parts.reference, set.shapes, stop);
-  if (!detail) return {nullptr, cancelled};
-  parts.detail = std::move(*detail);
+  parts.reference = set.shapes[nearestToMean(*calculus, spider.solution, stop)];
+  auto prolongation = Prolongation::learn(set.topology, parts.coarsening, parts.reference, set.shapes, stop);
+  if (!prolongation) return {nullptr, cancelled};
+  parts.detail = prolongation->detail();
   const Outcome outcome = parts.training.combined();
   report(progress, "done", 1);
-  return {std::make_shared<const ShellPgaModel>(std::move(parts)), outcome};
+  return {std::make_shared<const ShellPgaModel>(std::move(parts), calculus, std::move(prolongation)), outcome};
 }
 
 }  // namespace shaped

@@ -13,7 +13,8 @@ namespace shaped {
 class CholeskyAnalysis {
  public:
   explicit CholeskyAnalysis(BlockPatternPtr pattern);
-  ~CholeskyAnalysis();
+  /// The same; null once the stop token has fired.
+  static std::shared_ptr<const CholeskyAnalysis> make(BlockPatternPtr pattern, const std::stop_token& stop);
   CholeskyAnalysis(const CholeskyAnalysis&) = delete;
   CholeskyAnalysis& operator=(const CholeskyAnalysis&) = delete;
 
@@ -22,8 +23,12 @@ class CholeskyAnalysis {
  private:
   friend class CholeskyFactor;
   struct Impl;
+  CholeskyAnalysis(BlockPatternPtr pattern, std::shared_ptr<const Impl> impl);
+  /// Null once the stop token has fired.
+  static std::shared_ptr<const Impl> analyse(const BlockPattern& pattern, const std::stop_token& stop);
+
   BlockPatternPtr pattern_;
-  std::unique_ptr<Impl> impl_;
+  std::shared_ptr<const Impl> impl_;
 };
 
 using CholeskyAnalysisPtr = std::shared_ptr<const CholeskyAnalysis>;

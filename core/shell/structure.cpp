@@ -29,7 +29,17 @@ LowerSlot lowerSlot(const BlockPattern& pattern, const Stencil& vertices, Stenci
 }  // namespace
 
 ShellStructure::ShellStructure(TopologyPtr topology)
-    : topology_(std::move(topology)), analysis_(std::make_shared<CholeskyAnalysis>(makePattern(*topology_))) {
+    : ShellStructure(topology, std::make_shared<CholeskyAnalysis>(makePattern(*topology))) {}
+
+ShellStructurePtr ShellStructure::make(TopologyPtr topology, const std::stop_token& stop) {
+  if (stop.stop_requested()) return nullptr;
+  auto analysis = CholeskyAnalysis::make(makePattern(*topology), stop);
+  if (!analysis) return nullptr;
+  return ShellStructurePtr(new ShellStructure(std::move(topology), std::move(analysis)));
+}
+
+ShellStructure::ShellStructure(TopologyPtr topology, CholeskyAnalysisPtr analysis)
+    : topology_(std::move(topology)), analysis_(std::move(analysis)) {
   const auto& blocks = *pattern();
   face_slots_.resize(static_cast<std::size_t>(topology_->faces().rows()));
   face_general_slots_.resize(face_slots_.size());

@@ -21,6 +21,8 @@ struct LowerSlot {
 class ShellStructure {
  public:
   explicit ShellStructure(TopologyPtr topology);
+  /// The same; null once the stop token has fired.
+  static std::shared_ptr<const ShellStructure> make(TopologyPtr topology, const std::stop_token& stop);
 
   const Topology& topology() const { return *topology_; }
   const TopologyPtr& topologyPtr() const { return topology_; }
@@ -36,6 +38,8 @@ class ShellStructure {
   const std::vector<std::array<std::int32_t, 16>>& hingeGeneralSlots() const { return hinge_general_slots_; }
 
  private:
+  ShellStructure(TopologyPtr topology, CholeskyAnalysisPtr analysis);
+
   TopologyPtr topology_;
   CholeskyAnalysisPtr analysis_;
   std::vector<std::array<LowerSlot, 6>> face_slots_;

@@ -30,8 +30,7 @@ Solved<Vertices> elasticAverage(const GeodesicCalculus& calculus, const std::vec
     measure(calculus.topology(), shapes[i], measures[i]);
     objective.addUndeformed(measures[i], 1.0 / static_cast<double>(shapes.size()));
   }
-  const LengthAngleReconstruction reconstruction(calculus.structure()->topologyPtr());
-  Vertices start = reconstruction.reconstruct(averageMeasures(measures), shapes.front());
+  Vertices start = calculus.reconstruction().reconstruct(averageMeasures(measures), shapes.front(), options.stop);
   if (start.rows() == 0 || !std::isfinite(objective.value(flatten(start)))) start = shapes.front();
   return minimiseShell(objective, *calculus.structure(), start, {100, 1e-4, options.stop});
 }

@@ -56,6 +56,7 @@ class Submanifold {
 
   const ShellPga& pga() const { return *pga_; }
   const GeodesicCalculus& calculus() const { return *calculus_; }
+  const std::shared_ptr<const GeodesicCalculus>& calculusPtr() const { return calculus_; }
   /// p_j, or p_-j for j >= J, on the calculus's mesh.
   Vertices variation(std::size_t j) const;
   /// Memory of what is kept beside mean and variations once all of these have been used [bytes].

@@ -37,12 +37,6 @@ ShellPgaTrainingOptions optionsFrom(const v1::ShellPgaTraining& message, const D
   return options;
 }
 
-ShellPgaModelPtr withSeconds(const ShellPgaModel& model, double seconds) {
-  auto parts = model.parts();
-  parts.training.seconds = seconds;
-  return std::make_shared<const ShellPgaModel>(std::move(parts));
-}
-
 /// The checkpoint of one training job: found where an earlier process left it, written as time goes by.
 class TrainingCheckpoint {
  public:
@@ -114,8 +108,10 @@ JobResult train(const JobContext& context, const JobRun& run) {
     return result;
   }
   patiently(context, run, [&] { run.solved(result); });
+  auto record = trained.solution->parts().training;
+  record.seconds = result.seconds;
+  const auto model = trained.solution->withRecord(record);
   const Provenance provenance{request.dataset(), std::chrono::system_clock::now(), run.job.id, run.job.key};
-  const auto model = withSeconds(*trained.solution, result.seconds);
   patiently(context, run,
             [&] { result.model_version = context.models.publish(request.model_name(), model, provenance)->version; });
   return result;

@@ -36,7 +36,7 @@ struct Shapes {
 struct Model {
   Shapes shapes;
   Coarsening coarsening;
-  std::optional<Prolongation> plain, learned;
+  std::shared_ptr<const Prolongation> plain, learned;
 };
 
 Shapes split(const TopologyPtr& topology, const Vertices& reference, const std::vector<Vertices>& all, double unit) {
@@ -88,8 +88,8 @@ const Model* model(int set) {
   auto& entry = models[set];
   if (const auto shapes = load(set)) {
     entry.emplace(Model{*shapes, coarsen(shapes->topology, shapes->training), {}, {}});
-    entry->plain.emplace(shapes->topology, entry->coarsening, shapes->reference);
-    entry->learned.emplace(shapes->topology, entry->coarsening, shapes->reference, shapes->training);
+    entry->plain = Prolongation::learn(shapes->topology, entry->coarsening, shapes->reference, {});
+    entry->learned = Prolongation::learn(shapes->topology, entry->coarsening, shapes->reference, shapes->training);
   }
   return entry ? &*entry : nullptr;
 }
@@ -132,7 +132,7 @@ void coarsening(benchmark::State& state) {
 void learning(benchmark::State& state) {
   const auto* m = model(static_cast<int>(state.range(0)));
   if (!m) return state.SkipWithError("real data not found; set SHAPED_DATA to its folder");
-  for (auto _ : state) Prolongation(m->shapes.topology, m->coarsening, m->shapes.reference, m->shapes.training);
+  for (auto _ : state) Prolongation::learn(m->shapes.topology, m->coarsening, m->shapes.reference, m->shapes.training);
 }
 
 void loading(benchmark::State& state) {

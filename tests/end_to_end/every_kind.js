@@ -122,13 +122,13 @@ async function busy() {
 async function deadline() {
   const begin = process.hrtime.bigint();
   const waiting = (await failing(unary(daemon.models, 'WaitUntilReady', {model: {name: 'never'}}, 0.5))).code;
-  const solving = (await failing(all(interpolate(Array(10000).fill(0.5), 0.5)))).code;
+  const solving = (await failing(all(interpolate(Array(10000).fill(0.3), 0.5)))).code;
   const seconds = 1e-9 * Number(process.hrtime.bigint() - begin);
   return {waiting, solving, seconds, left: await callsLeft()};
 }
 
 async function cancellation() {
-  const call = interpolate(Array(10000).fill(0.5));
+  const call = interpolate(Array(10000).fill(0.3));
   const answers = call[Symbol.asyncIterator]();
   const first = (await answers.next()).value.part;
   call.cancel();

@@ -152,12 +152,12 @@ class Client:
         request = models_pb2.WaitUntilReadyRequest()
         request.model.name = "never"
         waiting = failing(lambda: wait(request, timeout=0.5))["code"]
-        solving = failing(lambda: self.interpolate([0.5] * 10000, 0.5))["code"]
+        solving = failing(lambda: self.interpolate([0.3] * 10000, 0.5))["code"]
         seconds = time.monotonic() - begin
         return {"waiting": waiting, "solving": solving, "seconds": seconds, "left": self.calls_left()}
 
     def cancellation(self):
-        answers = self.interpolate([0.5] * 10000)
+        answers = self.interpolate([0.3] * 10000)
         first = next(answers).WhichOneof("part")
         answers.cancel()
         code = failing(lambda: answers)["code"]

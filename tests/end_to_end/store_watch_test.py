@@ -78,7 +78,7 @@ class Stored(unittest.TestCase):
 
 class Preload(Stored):
     def test_health_waits_for_the_models_and_other_calls_do_not(self):
-        many_modes(self.models / "tubes/1", self.models / "slow/1", 1500)
+        many_modes(self.models / "tubes/1", self.models / "slow/1", 4000)
         for _ in range(5):  # once the daemon must be seen while it loads
             self.start("--preload", "slow,tubes@1")
             first = self.health()
@@ -114,7 +114,7 @@ class Preload(Stored):
                 Daemon(self.store, "--preload", text)
 
     def test_it_stops_while_it_loads(self):
-        many_modes(self.models / "tubes/1", self.models / "slow/1", 1500)
+        many_modes(self.models / "tubes/1", self.models / "slow/1", 4000)
         code, log = self.start("--preload", "all").stop()
         self.assertEqual(code, 0, log)
 

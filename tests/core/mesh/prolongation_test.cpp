@@ -45,8 +45,9 @@ struct Fixture {
 TEST_CASE("the reference and the kept vertices are reproduced") {
   const Fixture f;
   for (const bool learn : {false, true}) {
-    const Prolongation prolongation(f.mesh.topology, f.coarsening, f.mesh.vertices,
-                                    learn ? std::vector{f.bent(0.5), f.bent(1.0)} : std::vector<Vertices>{});
+    const Prolongation prolongation =
+        *Prolongation::learn(f.mesh.topology, f.coarsening, f.mesh.vertices,
+                             learn ? std::vector{f.bent(0.5), f.bent(1.0)} : std::vector<Vertices>{});
     CHECK(maxVertexDistance(prolongation.prolongate(f.restricted(0)), f.mesh.vertices) < 1e-12);
     const auto coarse = jitter(f.restricted(1.2), 0.02, 3);
     CHECK(maxVertexDistance(restrictTo(f.coarsening, prolongation.prolongate(coarse)), coarse) < 1e-13);
@@ -55,7 +56,8 @@ TEST_CASE("the reference and the kept vertices are reproduced") {
 
 TEST_CASE("rigid motions and uniform scaling pass through") {
   const Fixture f;
-  const Prolongation prolongation(f.mesh.topology, f.coarsening, f.mesh.vertices, {f.bent(0.8), f.bent(-0.4)});
+  const Prolongation prolongation =
+      *Prolongation::learn(f.mesh.topology, f.coarsening, f.mesh.vertices, {f.bent(0.8), f.bent(-0.4)});
   const auto coarse = jitter(f.restricted(1.2), 0.02, 3);
   const auto fine = prolongation.prolongate(coarse);
   CHECK(maxVertexDistance(prolongation.prolongate(moveRigidly(coarse, 9)), moveRigidly(fine, 9)) < 1e-12);
@@ -66,9 +68,9 @@ TEST_CASE("rigid motions and uniform scaling pass through") {
 
 TEST_CASE("unseen bends keep their relief, and learning from other bends helps") {
   const Fixture f;
-  const Prolongation plain(f.mesh.topology, f.coarsening, f.mesh.vertices);
-  const Prolongation learned(f.mesh.topology, f.coarsening, f.mesh.vertices,
-                             {f.bent(0.4), f.bent(1.2), f.bent(-0.4), f.bent(-1.2)});
+  const Prolongation plain = *Prolongation::learn(f.mesh.topology, f.coarsening, f.mesh.vertices, {});
+  const Prolongation learned = *Prolongation::learn(f.mesh.topology, f.coarsening, f.mesh.vertices,
+                                                    {f.bent(0.4), f.bent(1.2), f.bent(-0.4), f.bent(-1.2)});
   for (const double angle : {0.8, -0.8, 1.5}) {
     CHECK(f.error(plain, angle) < 0.01);
     CHECK(f.error(learned, angle) < 0.7 * f.error(plain, angle));
@@ -83,15 +85,15 @@ TEST_CASE("learning works on shapes in any position") {
   const Fixture f;
   const std::vector<Vertices> training{f.bent(0.4), f.bent(1.2)};
   const std::vector<Vertices> moved{moveRigidly(training[0], 5), moveRigidly(training[1], 6)};
-  const Prolongation one(f.mesh.topology, f.coarsening, f.mesh.vertices, training);
-  const Prolongation two(f.mesh.topology, f.coarsening, f.mesh.vertices, moved);
+  const Prolongation one = *Prolongation::learn(f.mesh.topology, f.coarsening, f.mesh.vertices, training);
+  const Prolongation two = *Prolongation::learn(f.mesh.topology, f.coarsening, f.mesh.vertices, moved);
   const auto coarse = f.restricted(0.9);
   CHECK(maxVertexDistance(one.prolongate(coarse), two.prolongate(coarse)) < 1e-9);
 }
 
 TEST_CASE("prolongation is continuous, also where a coarse triangle loses its area") {
   const Fixture f;
-  const Prolongation prolongation(f.mesh.topology, f.coarsening, f.mesh.vertices, {f.bent(0.8)});
+  const Prolongation prolongation = *Prolongation::learn(f.mesh.topology, f.coarsening, f.mesh.vertices, {f.bent(0.8)});
   const auto& faces = f.coarsening.coarse->faces();
   Vertices coarse = f.restricted(0.5);
   const Eigen::RowVector3d start = coarse.row(faces(40, 0)),
@@ -110,7 +112,8 @@ TEST_CASE("prolongation is continuous, also where a coarse triangle loses its ar
 
 TEST_CASE("small errors of the coarse shape stay small") {
   const Fixture f;
-  const Prolongation prolongation(f.mesh.topology, f.coarsening, f.mesh.vertices, {f.bent(0.4), f.bent(1.2)});
+  const Prolongation prolongation =
+      *Prolongation::learn(f.mesh.topology, f.coarsening, f.mesh.vertices, {f.bent(0.4), f.bent(1.2)});
   const auto coarse = f.restricted(0.9);
   const auto noisy = jitter(coarse, 0.002, 8);
   CHECK(meanVertexDistance(prolongation.prolongate(noisy), prolongation.prolongate(coarse)) <
@@ -119,7 +122,7 @@ TEST_CASE("small errors of the coarse shape stay small") {
 
 TEST_CASE("a prolongation made from stored parts is the same one") {
   const Fixture f;
-  const Prolongation one(f.mesh.topology, f.coarsening, f.mesh.vertices, {f.bent(0.8)});
+  const Prolongation one = *Prolongation::learn(f.mesh.topology, f.coarsening, f.mesh.vertices, {f.bent(0.8)});
   const Prolongation two(f.mesh.topology, f.coarsening, f.mesh.vertices, one.detail());
   const auto coarse = f.restricted(-0.9);
   CHECK(one.prolongate(coarse) == two.prolongate(coarse));
@@ -130,7 +133,7 @@ TEST_CASE("a prolongation made from stored parts is the same one") {
 
 TEST_CASE("prolongation may be called from several threads") {
   const Fixture f;
-  const Prolongation prolongation(f.mesh.topology, f.coarsening, f.mesh.vertices, {f.bent(0.8)});
+  const Prolongation prolongation = *Prolongation::learn(f.mesh.topology, f.coarsening, f.mesh.vertices, {f.bent(0.8)});
   const auto coarse = f.restricted(1.1);
   const auto expected = prolongation.prolongate(coarse);
   std::array<Vertices, 4> results;
@@ -146,7 +149,8 @@ TEST_CASE("prolongation may be called from several threads") {
 TEST_CASE("a mesh that was not coarsened passes through") {
   const auto mesh = icosphere(1);
   const auto whole = coarsen(mesh.topology, {mesh.vertices});
-  const Prolongation prolongation(mesh.topology, whole, mesh.vertices, {jitter(mesh.vertices, 0.05, 2)});
+  const Prolongation prolongation =
+      *Prolongation::learn(mesh.topology, whole, mesh.vertices, {jitter(mesh.vertices, 0.05, 2)});
   const auto shape = jitter(mesh.vertices, 0.1, 1);
   CHECK(maxVertexDistance(prolongation.prolongate(shape), shape) < 1e-15);
 }
@@ -156,7 +160,7 @@ TEST_CASE("a surface with boundary and one with few coarse vertices are carried 
   CoarseningOptions options;
   options.vertex_count = 8;
   const auto coarsening = coarsen(mesh.topology, {mesh.vertices}, options);
-  const Prolongation prolongation(mesh.topology, coarsening, mesh.vertices);
+  const Prolongation prolongation = *Prolongation::learn(mesh.topology, coarsening, mesh.vertices, {});
   const auto flat = prolongation.prolongate(restrictTo(coarsening, mesh.vertices));
   CHECK(maxVertexDistance(flat, mesh.vertices) < 1e-12);
   const Vertices bent = bend(mesh.vertices, 0.5);
@@ -168,7 +172,7 @@ TEST_CASE("prolongation refuses what it cannot use, by name") {
   const auto& topology = f.mesh.topology;
   const auto make = [&](const Coarsening& coarsening, const Vertices& reference,
                         const std::vector<Vertices>& training) {
-    return Prolongation(topology, coarsening, reference, training);
+    return *Prolongation::learn(topology, coarsening, reference, training);
   };
   CHECK_THROWS_WITH(make(f.coarsening, f.mesh.vertices.topRows(9), {}), Catch::Contains("reference: has 9 vertices"));
   CHECK_THROWS_WITH(make(f.coarsening, f.mesh.vertices, {f.mesh.vertices, Vertices(2, 3)}),
@@ -196,8 +200,8 @@ TEST_CASE("unseen body poses are carried over to better than 1.5 mm", "[data]") 
   for (int frame = 0; frame < 72; frame += 6) training.push_back(frames.frame(frame));
   for (int frame = 3; frame < 72; frame += 12) unseen.push_back(frames.frame(frame));
   const auto coarsening = coarsen(topology, training);
-  const Prolongation plain(topology, coarsening, file.vertices);
-  const Prolongation learned(topology, coarsening, file.vertices, training);
+  const Prolongation plain = *Prolongation::learn(topology, coarsening, file.vertices, {});
+  const Prolongation learned = *Prolongation::learn(topology, coarsening, file.vertices, training);
   double plain_error = 0, learned_error = 0;
   for (const auto& shape : unseen) {
     const auto coarse = restrictTo(coarsening, shape);
