@@ -4,13 +4,12 @@
 
 #include <metis.h>
 
-#include <functional>
-#include <mutex>
 #include <numeric>
 #include <stdexcept>
 #include <string>
 
 #include "core/numerics/long_piece.h"
+#include "core/numerics/metis_isolation.h"
 
 namespace shaped {
 namespace {
@@ -35,12 +34,8 @@ Graph graphOf(const BlockPattern& pattern) {
   return graph;
 }
 
-/// METIS draws from the process's one generator of random numbers, which each call seeds anew: two at once would give
-/// other orders, and so other roundings, than one after the other.
-void callMetis(std::size_t nodes, const std::function<int()>& call) {
-  static std::mutex one_at_a_time;
-  const std::lock_guard lock(one_at_a_time);
-  if (call() != METIS_OK)
+void require(int status, std::size_t nodes) {
+  if (status != METIS_OK)
     throw std::runtime_error("METIS could not order a matrix of " + std::to_string(nodes) + " nodes");
 }
 
@@ -68,10 +63,10 @@ void appendWhole(Graph& graph, std::vector<std::int32_t>& order) {
   const LongPiece piece("nested dissection");
   auto count = static_cast<idx_t>(graph.nodes.size());
   std::vector<idx_t> local(graph.nodes.size()), inverse(graph.nodes.size());
-  callMetis(graph.nodes.size(), [&] {
-    return METIS_NodeND(&count, graph.begin.data(), graph.neighbours.data(), nullptr, nullptr, local.data(),
-                        inverse.data());
-  });
+  const MetisIsolation isolation;
+  require(
+      METIS_NodeND(&count, graph.begin.data(), graph.neighbours.data(), nullptr, nullptr, local.data(), inverse.data()),
+      graph.nodes.size());
   for (const auto i : local) order.push_back(graph.nodes[static_cast<std::size_t>(i)]);
 }
 
@@ -81,10 +76,10 @@ std::vector<idx_t> sidesOf(Graph& graph) {
   auto count = static_cast<idx_t>(graph.nodes.size());
   idx_t size = 0;
   std::vector<idx_t> sides(graph.nodes.size());
-  callMetis(graph.nodes.size(), [&] {
-    return METIS_ComputeVertexSeparator(&count, graph.begin.data(), graph.neighbours.data(), nullptr, nullptr, &size,
-                                        sides.data());
-  });
+  const MetisIsolation isolation;
+  require(METIS_ComputeVertexSeparator(&count, graph.begin.data(), graph.neighbours.data(), nullptr, nullptr, &size,
+                                       sides.data()),
+          graph.nodes.size());
   return sides;
 }
 

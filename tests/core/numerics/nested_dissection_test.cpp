@@ -1,7 +1,10 @@
 #include "core/numerics/nested_dissection.h"
 
 #include <algorithm>
+#include <atomic>
 #include <catch2/catch.hpp>
+#include <csignal>
+#include <cstdlib>
 #include <numeric>
 #include <thread>
 
@@ -83,6 +86,43 @@ TEST_CASE("dissections in several threads at once give what one alone gives") {
     }
     for (const auto& order : together) CHECK(order == alone);
   }
+}
+
+TEST_CASE("who else draws random numbers changes no dissection, and is not changed by it") {
+  const auto pattern = patternOf(*tube(200, 40).topology);
+  const auto alone = nestedDissection(*pattern, {});
+  std::srand(5);
+  const int first = std::rand(), second = std::rand();
+  std::srand(5);
+  CHECK(std::rand() == first);
+  nestedDissection(*pattern, {});
+  CHECK(std::rand() == second);
+  const std::jthread other([](const std::stop_token& stop) {
+    while (!stop.stop_requested()) std::rand();
+  });
+  for (int repeat = 0; repeat < 3; ++repeat) CHECK(nestedDissection(*pattern, {}) == alone);
+}
+
+TEST_CASE("a dissection leaves the handler of SIGTERM alone") {
+  const auto pattern = patternOf(*tube(200, 40).topology);
+  const auto ours = [](int) {};
+  const auto before = std::signal(SIGTERM, ours);
+  std::atomic<int> looks = 0, strange = 0;
+  {
+    const std::jthread watcher([&](const std::stop_token& stop) {
+      while (!stop.stop_requested()) {
+        struct sigaction now {};
+        sigaction(SIGTERM, nullptr, &now);
+        if (now.sa_handler != static_cast<void (*)(int)>(ours)) ++strange;
+        ++looks;
+      }
+    });
+    while (looks == 0) std::this_thread::yield();
+    for (int repeat = 0; repeat < 3; ++repeat) nestedDissection(*pattern, {});
+  }
+  CHECK(looks > 10);
+  CHECK(strange == 0);
+  std::signal(SIGTERM, before);
 }
 
 TEST_CASE("a dissection that is stopped begins no further piece and gives nothing") {
