@@ -1,0 +1,153 @@
+#include "core/curve/smoothing_flow.h"
+
+#include <tbb/parallel_for.h>
+
+#include <algorithm>
+#include <cmath>
+#include <numeric>
+
+#include "core/curve/elastic_average.h"
+#include "core/mesh/alignment.h"
+#include "core/numerics/error.h"
+
+namespace shaped {
+namespace {
+
+constexpr double kShortestStep = 1e-4;    ///< of options.tau; shorter ones change nothing that anybody sees
+constexpr double kShortestLength = 1e-3;  ///< of a segment, relative to the mean, where weights are one over lengths
+
+}  // namespace
+
+std::optional<std::string> SmoothingFlowOptions::firstViolation(std::size_t frames) const {
+  if (!(tau > 0 && tau <= 1)) return "tau = " + std::to_string(tau) + ", want in (0, 1]";
+  if (!(shape_tolerance > 0)) return "shape_tolerance = " + std::to_string(shape_tolerance) + ", want > 0";
+  if (!restore.empty() && restore.size() != frames)
+    return "restore has " + std::to_string(restore.size()) + " entries, want one for each of " +
+           std::to_string(frames) + " frames";
+  for (std::size_t i = 0; i < restore.size(); ++i)
+    if (!(restore[i] >= 0 && restore[i] <= 1))
+      return "restore[" + std::to_string(i) + "] = " + std::to_string(restore[i]) + ", want in [0, 1]";
+  if (!held.empty() && held.size() != frames)
+    return "held has " + std::to_string(held.size()) + " entries, want one for each of " + std::to_string(frames) +
+           " frames";
+  return std::nullopt;
+}
+
+double SmoothingFlow::State::functional(const Coefficients& coefficients) const {
+  return std::inner_product(segments.begin(), segments.end(), coefficients.segments.begin(), 0.0) +
+         std::inner_product(restoring.begin(), restoring.end(), coefficients.restoring.begin(), 0.0);
+}
+
+SmoothingFlow::SmoothingFlow(ShellStructurePtr structure, const PairEnergy& energy, Curve curve,
+                             SmoothingFlowOptions options)
+    : structure_(std::move(structure)), energy_(energy), options_(std::move(options)), tau_(options_.tau) {
+  const auto& topology = structure_->topology();
+  requireOneComponent(topology, "topology");
+  requireCurve(topology, curve, "frames");
+  if (const auto violation = options_.firstViolation(curve.size())) throw InvalidInput("options", *violation);
+  pull_.assign(curve.size(), 0);
+  for (std::size_t i = 0; i < options_.restore.size(); ++i)
+    if (const double rho = options_.restore[i]; rho < 1) pull_[i] = rho / ((1 - rho) * options_.tau);
+  beginning_.measures = measuresOf(topology, curve);
+  beginning_.curve = std::move(curve);
+  now_ = beginning_;
+  evaluate(now_);
+}
+
+bool SmoothingFlow::free(std::size_t i) const {
+  const auto& curve = beginning_.curve;
+  if (!curve.closed && (i == 0 || i + 1 == curve.size())) return false;
+  if (!options_.held.empty() && options_.held[i]) return false;
+  return options_.restore.empty() || options_.restore[i] < 1;
+}
+
+SmoothingFlow::Coefficients SmoothingFlow::coefficients() const {
+  Coefficients result{std::vector<double>(now_.segments.size(), 1), std::vector<double>(now_.curve.size(), 0)};
+  std::vector<double> lengths;
+  for (const double energy : now_.segments) lengths.push_back(std::sqrt(std::max(energy, 0.0)));
+  const double mean = std::accumulate(lengths.begin(), lengths.end(), 0.0) / static_cast<double>(lengths.size());
+  if (options_.keep_speed && mean > 0)
+    for (std::size_t k = 0; k < lengths.size(); ++k)
+      result.segments[k] = mean / std::max(lengths[k], kShortestLength * mean);
+  for (std::size_t i = 0; i < pull_.size(); ++i)
+    if (free(i)) result.restoring[i] = pull_[i] * (result.segments[now_.curve.previous(i)] + result.segments[i]);
+  return result;
+}
+
+Solved<Vertices> SmoothingFlow::average(std::size_t i, double tau, const Coefficients& coefficients) const {
+  const auto& curve = now_.curve;
+  const auto previous = curve.previous(i), next = curve.next(i);
+  const double before = coefficients.segments[previous], after = coefficients.segments[i];
+  const double share = tau / (before + after);
+  const double weights[] = {share * before, 1 - tau, share * after, share * coefficients.restoring[i]};
+  auto solved = elasticAverage(structure_, energy_,
+                               {{&now_.measures[previous], weights[0]},
+                                {&now_.measures[i], weights[1]},
+                                {&now_.measures[next], weights[2]},
+                                {&beginning_.measures[i], weights[3]}},
+                               curve.frames[i], {60, options_.shape_tolerance, options_.stop});
+  const Vertices place = (weights[0] * curve.frames[previous] + weights[1] * curve.frames[i] +
+                          weights[2] * curve.frames[next] + weights[3] * beginning_.curve.frames[i]) /
+                         (weights[0] + weights[1] + weights[2] + weights[3]);
+  solved.solution = apply(alignRigidly(solved.solution, place), solved.solution);
+  return solved;
+}
+
+Solved<SmoothingFlow::State> SmoothingFlow::moved(double tau, const Coefficients& coefficients) const {
+  Solved<State> result(now_, {});
+  auto& state = result.solution;
+  std::vector<Outcome> outcomes(state.curve.size());
+  tbb::parallel_for(std::size_t{0}, state.curve.size(), [&](std::size_t i) {
+    if (!free(i)) return;
+    auto solved = average(i, tau, coefficients);
+    outcomes[i] = solved;
+    state.curve.frames[i] = std::move(solved.solution);
+    measure(structure_->topology(), state.curve.frames[i], state.measures[i]);
+  });
+  for (const auto& outcome : outcomes) result += outcome;
+  if (result.converged()) evaluate(state);
+  return result;
+}
+
+void SmoothingFlow::evaluate(State& state) const {
+  const auto& topology = structure_->topology();
+  state.segments = segmentEnergies(topology, energy_.bending(), state.curve, state.measures);
+  state.restoring.assign(state.curve.size(), 0);
+  tbb::parallel_for(std::size_t{0}, pull_.size(), [&](std::size_t i) {
+    const auto &from = beginning_.measures[i], &to = state.measures[i];
+    if (pull_[i] > 0)
+      state.restoring[i] =
+          shellEnergy(topology, from, to, energy_.bending()) + shellEnergy(topology, to, from, energy_.bending());
+  });
+}
+
+Solved<SmoothingStep> SmoothingFlow::step() {
+  const auto weights = coefficients();
+  const double before = now_.functional(weights);
+  SmoothingStep taken{0, 0, pathEnergy(), before, before};
+  Outcome total;
+  double tau = options_.control ? std::min(options_.tau, 2 * tau_) : options_.tau;
+  for (;; tau /= 2, ++taken.halvings) {
+    auto next = moved(tau, weights);
+    total = {next.termination, total.iterations + next.iterations, next.residual};
+    if (total.termination == Termination::kCancelled) break;
+    const double after = total.converged() ? next.solution.functional(weights) : before;
+    if (total.converged() && (after < before || !options_.control)) {
+      now_ = std::move(next.solution);
+      tau_ = tau;
+      return {{tau, taken.halvings, pathEnergy(), before, after}, total};
+    }
+    if (options_.control && tau >= 2 * kShortestStep * options_.tau) continue;
+    if (total.converged()) total.termination = Termination::kStalled;
+    break;
+  }
+  return {taken, total};
+}
+
+double SmoothingFlow::pathEnergy() const { return std::accumulate(now_.segments.begin(), now_.segments.end(), 0.0); }
+
+std::vector<double> SmoothingFlow::gradientNorms() const {
+  return shaped::gradientNorms(structure_->topology(), energy_.bending(), now_.curve, now_.measures);
+}
+
+}  // namespace shaped
