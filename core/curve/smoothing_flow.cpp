@@ -6,7 +6,6 @@
 #include <cmath>
 #include <numeric>
 
-#include "core/curve/elastic_average.h"
 #include "core/mesh/alignment.h"
 #include "core/numerics/error.h"
 
@@ -15,6 +14,16 @@ namespace {
 
 constexpr double kShortestStep = 1e-4;    ///< of options.tau; shorter ones change nothing that anybody sees
 constexpr double kShortestLength = 1e-3;  ///< of a segment, relative to the mean, where weights are one over lengths
+
+/// In the space of all shapes, by Newton's method.
+FrameAverage fullAverage(const ShellStructurePtr& structure, const PairEnergy& energy,
+                         const SmoothingFlowOptions& options) {
+  return [=, newton = NewtonOptions{60, options.shape_tolerance, options.stop}](
+             std::size_t, const std::vector<AverageTerm>& terms, const FlowFrame& now) {
+    auto solved = elasticAverage(structure, energy, terms, now.shape, newton);
+    return Solved<FlowFrame>({std::move(solved.solution)}, solved);
+  };
+}
 
 }  // namespace
 
@@ -40,16 +49,27 @@ double SmoothingFlow::State::functional(const Coefficients& coefficients) const 
 
 SmoothingFlow::SmoothingFlow(ShellStructurePtr structure, const PairEnergy& energy, Curve curve,
                              SmoothingFlowOptions options)
-    : structure_(std::move(structure)), energy_(energy), options_(std::move(options)), tau_(options_.tau) {
-  const auto& topology = structure_->topology();
-  requireOneComponent(topology, "topology");
-  requireCurve(topology, curve, "frames");
+    : SmoothingFlow(structure->topologyPtr(), energy.bending(), std::move(curve), {},
+                    fullAverage(structure, energy, options), options) {}
+
+SmoothingFlow::SmoothingFlow(TopologyPtr topology, double bending, Curve curve,
+                             std::vector<Eigen::VectorXd> coordinates, FrameAverage average,
+                             SmoothingFlowOptions options)
+    : topology_(std::move(topology)),
+      bending_(bending),
+      average_(std::move(average)),
+      options_(std::move(options)),
+      tau_(options_.tau) {
+  requireOneComponent(*topology_, "topology");
+  requireCurve(*topology_, curve, "frames");
   if (const auto violation = options_.firstViolation(curve.size())) throw InvalidInput("options", *violation);
   pull_.assign(curve.size(), 0);
   for (std::size_t i = 0; i < options_.restore.size(); ++i)
     if (const double rho = options_.restore[i]; rho < 1) pull_[i] = rho / ((1 - rho) * options_.tau);
-  beginning_.measures = measuresOf(topology, curve);
+  coordinates.resize(curve.size());
+  beginning_.measures = measuresOf(*topology_, curve);
   beginning_.curve = std::move(curve);
+  beginning_.coordinates = std::move(coordinates);
   now_ = beginning_;
   evaluate(now_);
 }
@@ -74,22 +94,23 @@ SmoothingFlow::Coefficients SmoothingFlow::coefficients() const {
   return result;
 }
 
-Solved<Vertices> SmoothingFlow::average(std::size_t i, double tau, const Coefficients& coefficients) const {
+Solved<FlowFrame> SmoothingFlow::average(std::size_t i, double tau, const Coefficients& coefficients) const {
   const auto& curve = now_.curve;
   const auto previous = curve.previous(i), next = curve.next(i);
   const double before = coefficients.segments[previous], after = coefficients.segments[i];
   const double share = tau / (before + after);
   const double weights[] = {share * before, 1 - tau, share * after, share * coefficients.restoring[i]};
-  auto solved = elasticAverage(structure_, energy_,
-                               {{&now_.measures[previous], weights[0]},
-                                {&now_.measures[i], weights[1]},
-                                {&now_.measures[next], weights[2]},
-                                {&beginning_.measures[i], weights[3]}},
-                               curve.frames[i], {60, options_.shape_tolerance, options_.stop});
+  auto solved = average_(i,
+                         {{&now_.measures[previous], weights[0]},
+                          {&now_.measures[i], weights[1]},
+                          {&now_.measures[next], weights[2]},
+                          {&beginning_.measures[i], weights[3]}},
+                         {curve.frames[i], now_.coordinates[i]});
   const Vertices place = (weights[0] * curve.frames[previous] + weights[1] * curve.frames[i] +
                           weights[2] * curve.frames[next] + weights[3] * beginning_.curve.frames[i]) /
                          (weights[0] + weights[1] + weights[2] + weights[3]);
-  solved.solution = apply(alignRigidly(solved.solution, place), solved.solution);
+  auto& shape = solved.solution.shape;
+  shape = apply(alignRigidly(shape, place), shape);
   return solved;
 }
 
@@ -101,8 +122,9 @@ Solved<SmoothingFlow::State> SmoothingFlow::moved(double tau, const Coefficients
     if (!free(i)) return;
     auto solved = average(i, tau, coefficients);
     outcomes[i] = solved;
-    state.curve.frames[i] = std::move(solved.solution);
-    measure(structure_->topology(), state.curve.frames[i], state.measures[i]);
+    state.curve.frames[i] = std::move(solved.solution.shape);
+    state.coordinates[i] = std::move(solved.solution.coordinates);
+    measure(*topology_, state.curve.frames[i], state.measures[i]);
   });
   for (const auto& outcome : outcomes) result += outcome;
   if (result.converged()) evaluate(state);
@@ -110,14 +132,12 @@ Solved<SmoothingFlow::State> SmoothingFlow::moved(double tau, const Coefficients
 }
 
 void SmoothingFlow::evaluate(State& state) const {
-  const auto& topology = structure_->topology();
-  state.segments = segmentEnergies(topology, energy_.bending(), state.curve, state.measures);
+  state.segments = segmentEnergies(*topology_, bending_, state.curve, state.measures);
   state.restoring.assign(state.curve.size(), 0);
   tbb::parallel_for(std::size_t{0}, pull_.size(), [&](std::size_t i) {
     const auto &from = beginning_.measures[i], &to = state.measures[i];
     if (pull_[i] > 0)
-      state.restoring[i] =
-          shellEnergy(topology, from, to, energy_.bending()) + shellEnergy(topology, to, from, energy_.bending());
+      state.restoring[i] = shellEnergy(*topology_, from, to, bending_) + shellEnergy(*topology_, to, from, bending_);
   });
 }
 
@@ -147,7 +167,7 @@ Solved<SmoothingStep> SmoothingFlow::step() {
 double SmoothingFlow::pathEnergy() const { return std::accumulate(now_.segments.begin(), now_.segments.end(), 0.0); }
 
 std::vector<double> SmoothingFlow::gradientNorms() const {
-  return shaped::gradientNorms(structure_->topology(), energy_.bending(), now_.curve, now_.measures);
+  return shaped::gradientNorms(*topology_, bending_, now_.curve, now_.measures);
 }
 
 }  // namespace shaped

@@ -1,8 +1,10 @@
 #pragma once
 
+#include <functional>
 #include <optional>
 
 #include "core/curve/curve.h"
+#include "core/curve/elastic_average.h"
 #include "core/numerics/solved.h"
 
 namespace shaped {
@@ -32,8 +34,19 @@ struct SmoothingStep {
   double after = 0;        ///< and after it
 };
 
-/// The curve smoothing flow of [BvTH16] (2) at full resolution: each step replaces every free frame by the elastic
-/// average of itself and its neighbours, and of what it was at the beginning where a restoring force acts.
+/// A frame of a flow.
+struct FlowFrame {
+  Vertices shape;
+  Eigen::VectorXd coordinates = {};  ///< in the frame's subspace, where it is confined to one
+};
+
+/// The average of these terms that takes the place of frame i, started from the frame as it is; in no particular
+/// position. Called for different frames at once.
+using FrameAverage =
+    std::function<Solved<FlowFrame>(std::size_t i, const std::vector<AverageTerm>& terms, const FlowFrame& now)>;
+
+/// The curve smoothing flow of [BvTH16] (2): each step replaces every free frame by the elastic average of itself and
+/// its neighbours, and of what it was at the beginning where a restoring force acts.
 ///
 /// With E[a, b] = W[a, b] + W[b, a], a step of length tau is one of descent for
 ///   F = sum over segments of s_k E[x_k, x_k+1] + sum over frames of r_i E[x_i, x_i^0],
@@ -54,12 +67,17 @@ class SmoothingFlow {
   /// Throws InvalidInput naming "frames", "frames[i]", "topology" (several components) or "options".
   SmoothingFlow(ShellStructurePtr structure, const PairEnergy& energy, Curve curve, SmoothingFlowOptions options);
 
+  /// With averages of another kind, such as those within a subspace per frame. coordinates: of the frames in theirs.
+  SmoothingFlow(TopologyPtr topology, double bending, Curve curve, std::vector<Eigen::VectorXd> coordinates,
+                FrameAverage average, SmoothingFlowOptions options);
+
   /// Takes a step. Converged: the step was taken. Stalled: no step of a reasonable length lowers F, which is so at a
   /// stationary curve; the curve is as before. The residual is the largest of the frames' solves. Runs a parallel loop
   /// over the frames in the current TBB arena.
   Solved<SmoothingStep> step();
 
   const Curve& curve() const { return now_.curve; }
+  FlowFrame frame(std::size_t i) const { return {now_.curve.frames[i], now_.coordinates[i]}; }
   double pathEnergy() const;  ///< (4) [m^2]
   /// As gradientNorms() of the curve as it stands.
   std::vector<double> gradientNorms() const;
@@ -72,6 +90,7 @@ class SmoothingFlow {
   /// A curve and all that follows from it.
   struct State {
     Curve curve;
+    std::vector<Eigen::VectorXd> coordinates;
     std::vector<ShellMeasures> measures;
     std::vector<double> segments,
         restoring;  ///< E of each segment; of each frame and its beginning, where it is pulled
@@ -81,12 +100,13 @@ class SmoothingFlow {
 
   bool free(std::size_t i) const;
   Coefficients coefficients() const;
-  Solved<Vertices> average(std::size_t i, double tau, const Coefficients& coefficients) const;
+  Solved<FlowFrame> average(std::size_t i, double tau, const Coefficients& coefficients) const;
   Solved<State> moved(double tau, const Coefficients& coefficients) const;
   void evaluate(State& state) const;
 
-  ShellStructurePtr structure_;
-  PairEnergy energy_;
+  TopologyPtr topology_;
+  double bending_;
+  FrameAverage average_;
   SmoothingFlowOptions options_;
   State beginning_, now_;
   std::vector<double> pull_;  ///< c_i

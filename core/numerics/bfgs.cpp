@@ -1,0 +1,53 @@
+#include "core/numerics/bfgs.h"
+
+#include <algorithm>
+#include <cmath>
+
+namespace shaped {
+namespace {
+
+/// B after a step and the change of the gradient over it, (6.17); as it was where the curvature along the step is not
+/// clearly positive.
+void update(Eigen::MatrixXd& inverse, const Eigen::VectorXd& step, const Eigen::VectorXd& change) {
+  const double curvature = step.dot(change);
+  if (!(curvature > 1e-8 * step.norm() * change.norm())) return;
+  const Eigen::VectorXd image = inverse * change;
+  const double scale = (1 + change.dot(image) / curvature) / curvature;
+  inverse += scale * step * step.transpose() - (image * step.transpose() + step * image.transpose()) / curvature;
+}
+
+}  // namespace
+
+Solved<Eigen::VectorXd> minimiseBfgs(const DifferentiableFunction& function, const Eigen::VectorXd& start,
+                                     Eigen::MatrixXd& inverse_hessian, const BfgsOptions& options) {
+  Eigen::VectorXd x = start, gradient(start.size()), next_gradient(start.size());
+  double value = function(x, gradient);
+  Outcome outcome;
+  for (outcome.iterations = 0;; ++outcome.iterations) {
+    outcome.termination = Termination::kNumericalFailure;
+    if (!std::isfinite(value) || !gradient.allFinite()) return {start, outcome};
+    const Eigen::VectorXd direction = -inverse_hessian * gradient;
+    const double slope = direction.dot(gradient);
+    outcome.residual = std::sqrt(std::max(-slope, 0.0) / options.reference);
+    outcome.termination = Termination::kConverged;
+    if (outcome.residual <= options.tolerance) break;
+    outcome.termination = Termination::kIterationLimit;
+    if (outcome.iterations >= options.max_iterations) break;
+    double length = 1, next = value;
+    for (; length > 1e-10; length *= 0.5) {
+      outcome.termination = Termination::kCancelled;
+      if (options.stop.stop_requested()) return {x, outcome};
+      next = function(x + length * direction, next_gradient);
+      if (next <= value + 1e-4 * length * slope + options.noise) break;
+    }
+    outcome.termination = Termination::kStalled;
+    if (!(length > 1e-10)) break;
+    update(inverse_hessian, length * direction, next_gradient - gradient);
+    x += length * direction;
+    value = next;
+    std::swap(gradient, next_gradient);
+  }
+  return {x, outcome};
+}
+
+}  // namespace shaped

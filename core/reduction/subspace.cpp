@@ -1,0 +1,73 @@
+#include "core/reduction/subspace.h"
+
+#include <Eigen/Eigenvalues>
+#include <algorithm>
+
+#include "core/mesh/alignment.h"
+
+namespace shaped {
+namespace {
+
+constexpr double kNegligible = 1e-9;
+
+Eigen::Map<const Eigen::VectorXd> flat(const Vertices& shape) { return {shape.data(), shape.size()}; }
+
+}  // namespace
+
+Vertices ShapeSubspace::shape(const Eigen::VectorXd& coordinates) const {
+  Vertices result = origin;
+  Eigen::Map<Eigen::VectorXd>(result.data(), result.size()).noalias() += basis * coordinates;
+  return result;
+}
+
+Eigen::VectorXd ShapeSubspace::coordinates(const Vertices& shape) const {
+  return basis.transpose() * (flat(shape) - flat(origin));
+}
+
+ShapeSubspace principalSubspace(const Vertices& origin, const std::vector<Vertices>& shapes, int dimension) {
+  Eigen::MatrixXd displacements(origin.size(), static_cast<Eigen::Index>(shapes.size()));
+  for (std::size_t i = 0; i < shapes.size(); ++i)
+    displacements.col(static_cast<Eigen::Index>(i)) = flat(shapes[i]) - flat(origin);
+  // There are far fewer shapes than coordinates: right singular vectors first. They have half the digits, so the basis
+  // is orthogonalised once more.
+  const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> gram(displacements.transpose() * displacements);
+  const Eigen::VectorXd squares = gram.eigenvalues().reverse().cwiseMax(0);
+  ShapeSubspace result{origin, Eigen::MatrixXd(origin.size(), 0)};
+  const auto wanted = std::min<Eigen::Index>(dimension, squares.size());
+  for (Eigen::Index j = 0; j < wanted && squares[j] > kNegligible * kNegligible * squares[0]; ++j) {
+    Eigen::VectorXd direction = displacements * gram.eigenvectors().col(squares.size() - 1 - j);
+    for (int pass = 0; pass < 2; ++pass) {
+      direction -= result.basis * (result.basis.transpose() * direction);
+      direction.normalize();
+    }
+    result.basis.conservativeResize(Eigen::NoChange, j + 1);
+    result.basis.col(j) = direction;
+  }
+  return result;
+}
+
+ShapeSubspace including(const ShapeSubspace& subspace, const Vertices& shape) {
+  const Eigen::VectorXd displacement = flat(shape) - flat(subspace.origin);
+  Eigen::VectorXd missing = displacement;
+  for (int pass = 0; pass < 2; ++pass) missing -= subspace.basis * (subspace.basis.transpose() * missing);
+  ShapeSubspace result = subspace;
+  if (!(missing.norm() > kNegligible * displacement.norm())) return result;
+  result.basis.conservativeResize(Eigen::NoChange, subspace.dimension() + 1);
+  result.basis.rightCols<1>() = missing.normalized();
+  return result;
+}
+
+std::size_t centralShape(const std::vector<Vertices>& shapes) {
+  std::vector<Vertices> aligned;
+  Vertices mean = Vertices::Zero(shapes.front().rows(), 3);
+  for (const auto& shape : shapes) {
+    aligned.push_back(apply(alignRigidly(shape, shapes.front()), shape));
+    mean += aligned.back() / static_cast<double>(shapes.size());
+  }
+  const auto distance = [&](const Vertices& shape) { return (shape - mean).squaredNorm(); };
+  const auto nearest = std::min_element(
+      aligned.begin(), aligned.end(), [&](const Vertices& a, const Vertices& b) { return distance(a) < distance(b); });
+  return static_cast<std::size_t>(nearest - aligned.begin());
+}
+
+}  // namespace shaped
