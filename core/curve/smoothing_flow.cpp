@@ -82,7 +82,7 @@ bool SmoothingFlow::free(std::size_t i) const {
 }
 
 SmoothingFlow::Coefficients SmoothingFlow::coefficients() const {
-  Coefficients result{std::vector<double>(now_.segments.size(), 1), std::vector<double>(now_.curve.size(), 0)};
+  Coefficients result{std::vector<double>(now_.segments.size(), 1), std::vector<double>(now_.curve.size(), 0), 0};
   std::vector<double> lengths;
   for (const double energy : now_.segments) lengths.push_back(std::sqrt(std::max(energy, 0.0)));
   const double mean = std::accumulate(lengths.begin(), lengths.end(), 0.0) / static_cast<double>(lengths.size());
@@ -91,6 +91,8 @@ SmoothingFlow::Coefficients SmoothingFlow::coefficients() const {
       result.segments[k] = mean / std::max(lengths[k], kShortestLength * mean);
   for (std::size_t i = 0; i < pull_.size(); ++i)
     if (free(i)) result.restoring[i] = pull_[i] * (result.segments[now_.curve.previous(i)] + result.segments[i]);
+  const auto sum = [](const std::vector<double>& values) { return std::accumulate(values.begin(), values.end(), 0.0); };
+  result.noise = 2e-14 * now_.measures.front().area.sum() * (sum(result.segments) + sum(result.restoring));
   return result;
 }
 
@@ -152,7 +154,7 @@ Solved<SmoothingStep> SmoothingFlow::step() {
     total = {next.termination, total.iterations + next.iterations, next.residual};
     if (total.termination == Termination::kCancelled) break;
     const double after = total.converged() ? next.solution.functional(weights) : before;
-    if (total.converged() && (after < before || !options_.control)) {
+    if (total.converged() && (after < before - weights.noise || !options_.control)) {
       now_ = std::move(next.solution);
       tau_ = tau;
       return {{tau, taken.halvings, pathEnergy(), before, after}, total};

@@ -86,6 +86,7 @@ class SmoothingFlow {
   /// s_k and r_i of one step.
   struct Coefficients {
     std::vector<double> segments, restoring;
+    double noise = 0;  ///< rounding error of F [m^2]: a fall below it is none
   };
   /// A curve and all that follows from it.
   struct State {
