@@ -3,14 +3,22 @@
 #include "core/shell/energy.h"
 
 namespace shaped {
+namespace {
 
-ReducedAverage::ReducedAverage(const ShellStructure& structure, const PairEnergy& energy,
-                               const std::vector<AverageTerm>& terms, const Vertices& origin,
-                               const Eigen::MatrixXd& basis)
-    : structure_(structure),
-      topology_(structure.topology()),
-      origin_(origin),
-      basis_(basis),
+Eigen::Map<Eigen::VectorXd> flat(Vertices& shape) { return {shape.data(), shape.size()}; }
+
+}  // namespace
+
+Vertices FrameSpace::ghost(const Eigen::VectorXd& coordinates) const {
+  Vertices shape = shared->origin();
+  flat(shape).noalias() += shared->basis() * coordinates.head(shared->dimension());
+  if (own.size() > 0) flat(shape) += coordinates.tail<1>()[0] * own;
+  return shape;
+}
+
+ReducedAverage::ReducedAverage(const FrameSpace& space, const PairEnergy& energy, const std::vector<AverageTerm>& terms)
+    : space_(space),
+      topology_(space.shared->structure().topology()),
       bending_(energy.bending()),
       undeformed_(topology_),
       gradient_(topology_) {
@@ -22,14 +30,19 @@ ReducedAverage::ReducedAverage(const ShellStructure& structure, const PairEnergy
   }
 }
 
-void ReducedAverage::moveTo(const Eigen::VectorXd& q) {
-  shape_ = origin_;
-  Eigen::Map<Eigen::VectorXd>(shape_.data(), shape_.size()).noalias() += basis_ * q;
+void ReducedAverage::moveTo(const Eigen::VectorXd& coordinates) {
+  shape_ = space_.ghost(coordinates);
   measure(topology_, shape_, measures_);
 }
 
-double ReducedAverage::operator()(const Eigen::VectorXd& q, Eigen::VectorXd& gradient) {
-  moveTo(q);
+void ReducedAverage::project(const Eigen::Ref<const Eigen::VectorXd>& vector, Eigen::VectorXd& coordinates) const {
+  coordinates.resize(space_.dimension());
+  coordinates.head(space_.shared->dimension()).noalias() = space_.shared->basis().transpose() * vector;
+  if (space_.own.size() > 0) coordinates.tail<1>()[0] = space_.own.dot(vector);
+}
+
+double ReducedAverage::operator()(const Eigen::VectorXd& coordinates, Eigen::VectorXd& gradient) {
+  moveTo(coordinates);
   double value = undeformed_.value(topology_, measures_);
   gradient_.setZero();
   undeformed_.addGradient(topology_, measures_, 1, gradient_);
@@ -39,21 +52,29 @@ double ReducedAverage::operator()(const Eigen::VectorXd& q, Eigen::VectorXd& gra
   }
   force_.setZero(shape_.rows(), 3);
   pullBackGradient(topology_, shape_, gradient_, force_);
-  gradient.noalias() = basis_.transpose() * Eigen::Map<const Eigen::VectorXd>(force_.data(), force_.size());
+  project(flat(force_), gradient);
   return value;
 }
 
-Eigen::MatrixXd ReducedAverage::hessian(const Eigen::VectorXd& q) {
-  moveTo(q);
+Eigen::MatrixXd ReducedAverage::hessian(const Eigen::VectorXd& coordinates) {
+  moveTo(coordinates);
   MeasureCurvature curvature(topology_, HessianKind::kProjected);
   undeformed_.addCurvature(topology_, measures_, 1, curvature);
   for (const auto& term : deformed_)
     addFirstCurvature(topology_, measures_, *term.measures, bending_, term.weight, curvature);
-  SymmetricBlockMatrix matrix(structure_.pattern());
-  pullBackHessian(structure_, shape_, curvature, matrix);
-  Eigen::MatrixXd image = Eigen::MatrixXd::Zero(basis_.rows(), basis_.cols());
-  for (Eigen::Index j = 0; j < basis_.cols(); ++j) matrix.multiplyAdd(basis_.col(j).data(), image.col(j).data());
-  return basis_.transpose() * image;
+  SymmetricBlockMatrix matrix(space_.shared->structure().pattern());
+  pullBackHessian(space_.shared->structure(), shape_, curvature, matrix);
+  Eigen::MatrixXd hessian(space_.dimension(), space_.dimension());
+  Eigen::VectorXd image(shape_.size()), column;
+  for (Eigen::Index j = 0; j < hessian.cols(); ++j) {
+    const bool shared = j < space_.shared->dimension();
+    const double* direction = shared ? space_.shared->basis().col(j).data() : space_.own.data();
+    image.setZero();
+    matrix.multiplyAdd(direction, image.data());
+    project(image, column);
+    hessian.col(j) = column;
+  }
+  return 0.5 * (hessian + hessian.transpose());
 }
 
 }  // namespace shaped

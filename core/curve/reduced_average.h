@@ -1,30 +1,40 @@
 #pragma once
 
 #include "core/curve/elastic_average.h"
+#include "core/reduction/ghost_space.h"
 #include "core/shell/average_energy.h"
 
 namespace shaped {
 
-/// The sum that an elastic average minimises, as a function of coordinates in a subspace: shape = origin + basis q.
+/// Where one frame may be: in a subspace that all frames share, and along a direction of its own.
+struct FrameSpace {
+  const GhostSpace* shared;
+  Eigen::VectorXd own = {};  ///< on the ghost mesh, 3G; empty: none
+
+  Eigen::Index dimension() const { return shared->dimension() + (own.size() > 0 ? 1 : 0); }
+  /// The ghost of these coordinates, the own direction's last. G x 3.
+  Vertices ghost(const Eigen::VectorXd& coordinates) const;
+};
+
+/// The sum that an elastic average minimises, as a function of a frame's coordinates.
 class ReducedAverage {
  public:
-  /// origin, basis: G x 3 and 3G x d; they live as long as this.
-  ReducedAverage(const ShellStructure& structure, const PairEnergy& energy, const std::vector<AverageTerm>& terms,
-                 const Vertices& origin, const Eigen::MatrixXd& basis);
+  /// terms: measures of ghosts. space: lives as long as this.
+  ReducedAverage(const FrameSpace& space, const PairEnergy& energy, const std::vector<AverageTerm>& terms);
 
-  /// The value and its gradient in q.
-  double operator()(const Eigen::VectorXd& q, Eigen::VectorXd& gradient);
+  /// The value and its gradient in the coordinates.
+  double operator()(const Eigen::VectorXd& coordinates, Eigen::VectorXd& gradient);
   double noise() const { return noise_; }
-  /// The Hessian in q, with every element made positive semi-definite, d x d.
-  Eigen::MatrixXd hessian(const Eigen::VectorXd& q);
+  /// The Hessian in the coordinates, with every element made positive semi-definite, d x d.
+  Eigen::MatrixXd hessian(const Eigen::VectorXd& coordinates);
 
  private:
-  void moveTo(const Eigen::VectorXd& q);
+  void moveTo(const Eigen::VectorXd& coordinates);
+  /// Of a vector on the ghost mesh along the frame's directions.
+  void project(const Eigen::Ref<const Eigen::VectorXd>& vector, Eigen::VectorXd& coordinates) const;
 
-  const ShellStructure& structure_;
+  const FrameSpace& space_;
   const Topology& topology_;
-  const Vertices& origin_;
-  const Eigen::MatrixXd& basis_;
   double bending_;
   AverageEnergy undeformed_;
   std::vector<AverageTerm> deformed_;

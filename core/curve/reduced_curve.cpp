@@ -5,7 +5,7 @@
 #include <Eigen/Dense>
 #include <algorithm>
 
-#include "core/curve/reduced_average.h"
+#include "core/mesh/alignment.h"
 #include "core/numerics/bfgs.h"
 #include "core/numerics/error.h"
 
@@ -13,14 +13,6 @@ namespace shaped {
 namespace {
 
 constexpr std::size_t kGhostShapes = 8;  ///< that the ghost mesh is made for, spread over the curve
-
-/// The rows of a 3V x d basis that belong to these vertices.
-Eigen::MatrixXd rowsOf(const Eigen::MatrixXd& basis, const std::vector<std::int32_t>& vertices) {
-  Eigen::MatrixXd rows(3 * static_cast<Eigen::Index>(vertices.size()), basis.cols());
-  for (std::size_t i = 0; i < vertices.size(); ++i)
-    rows.middleRows<3>(3 * static_cast<Eigen::Index>(i)) = basis.middleRows<3>(3 * vertices[i]);
-  return rows;
-}
 
 std::vector<Vertices> ghostShapes(const Curve& curve, std::size_t central) {
   std::vector<Vertices> shapes{curve.frames[central]};
@@ -41,39 +33,33 @@ ReducedCurve::ReducedCurve(const TopologyPtr& topology, double bending, const Cu
   if (options.dimension < 1)
     throw InvalidInput("options", "dimension = " + std::to_string(options.dimension) + ", want >= 1");
   const auto central = centralShape(curve.frames);
-  ghost_ = coarsen(topology, ghostShapes(curve, central), {options.ghost_vertices, {}, options.stop});
-  structure_ = std::make_shared<const ShellStructure>(ghost_.coarse);
-
   std::vector<Vertices> aligned(curve.size());
   tbb::parallel_for(std::size_t{0}, curve.size(), [&](std::size_t i) {
     aligned[i] = apply(alignRigidly(curve.frames[i], curve.frames[central]), curve.frames[i]);
   });
-  shared_ = principalSubspace(curve.frames[central], aligned, options.dimension);
-  ghost_origin_ = restrictTo(ghost_, shared_.origin);
+  space_ =
+      std::make_unique<const GhostSpace>(topology, principalSubspace(curve.frames[central], aligned, options.dimension),
+                                         ghostShapes(curve, central), options.ghost_vertices, options.stop);
   tbb::parallel_for(std::size_t{0}, curve.size(), [&](std::size_t i) { makeFrame(aligned[i], frames_[i]); });
-
   beginning_.closed = curve.closed;
-  for (const auto& frame : curve.frames) beginning_.frames.push_back(restrictTo(ghost_, frame));
+  for (const auto& frame : curve.frames) beginning_.frames.push_back(space_->restrict(frame));
 }
 
 void ReducedCurve::makeFrame(const Vertices& aligned, Frame& frame) const {
-  const auto own = including(shared_, aligned);
+  const auto& shared = space_->fine();
+  const auto own = including(shared, aligned);
   frame.start = own.coordinates(aligned);
-  frame.ghost_basis = rowsOf(own.basis, ghost_.kept);
-  if (own.dimension() > shared_.dimension()) frame.missing = own.basis.rightCols<1>();
-}
-
-Vertices ReducedCurve::ghostShape(const Frame& frame, const Eigen::VectorXd& coordinates) const {
-  Vertices shape = ghost_origin_;
-  Eigen::Map<Eigen::VectorXd>(shape.data(), shape.size()).noalias() += frame.ghost_basis * coordinates;
-  return shape;
+  frame.space.shared = space_.get();
+  if (own.dimension() == shared.dimension()) return;
+  frame.missing = own.basis.rightCols<1>();
+  frame.space.own = space_->restrict(frame.missing);
 }
 
 SmoothingFlow ReducedCurve::flow(const SmoothingFlowOptions& options) {
   std::vector<Eigen::VectorXd> coordinates;
   for (const auto& frame : frames_) coordinates.push_back(frame.start);
   return SmoothingFlow(
-      ghost_.coarse, bending_, beginning_, std::move(coordinates),
+      space_->topology(), bending_, beginning_, std::move(coordinates),
       [this](std::size_t i, const std::vector<AverageTerm>& terms, const FlowFrame& now) {
         return average(i, terms, now);
       },
@@ -82,7 +68,7 @@ SmoothingFlow ReducedCurve::flow(const SmoothingFlowOptions& options) {
 
 Solved<FlowFrame> ReducedCurve::average(std::size_t i, const std::vector<AverageTerm>& terms, const FlowFrame& now) {
   auto& frame = frames_[i];
-  ReducedAverage function(*structure_, {bending_, options_.symmetry}, terms, ghost_origin_, frame.ghost_basis);
+  ReducedAverage function(frame.space, {bending_, options_.symmetry}, terms);
   if (frame.inverse.size() == 0) {
     const Eigen::MatrixXd hessian = function.hessian(now.coordinates);
     const Eigen::MatrixXd ridge = 1e-10 * hessian.trace() * Eigen::MatrixXd::Identity(hessian.rows(), hessian.cols());
@@ -92,15 +78,16 @@ Solved<FlowFrame> ReducedCurve::average(std::size_t i, const std::vector<Average
   const double reference = std::max(function(now.coordinates, gradient), function.noise());
   const BfgsOptions options{60, options_.tolerance, reference, function.noise(), options_.stop};
   auto solved = minimiseBfgs(std::ref(function), now.coordinates, frame.inverse, options);
-  return {{ghostShape(frame, solved.solution), solved.solution}, solved};
+  return {{frame.space.ghost(solved.solution), solved.solution}, solved};
 }
 
 Vertices ReducedCurve::fine(std::size_t i, const FlowFrame& frame) const {
   const auto& own = frames_[i];
-  Vertices shape = shared_.shape(frame.coordinates.head(shared_.dimension()));
+  const auto& shared = space_->fine();
+  Vertices shape = shared.shape(frame.coordinates.head(shared.dimension()));
   if (own.missing.size() > 0)
     Eigen::Map<Eigen::VectorXd>(shape.data(), shape.size()) += frame.coordinates.tail<1>()[0] * own.missing;
-  return apply(alignRigidly(ghostShape(own, frame.coordinates), frame.shape), shape);
+  return apply(alignRigidly(own.space.ghost(frame.coordinates), frame.shape), shape);
 }
 
 }  // namespace shaped

@@ -1,9 +1,9 @@
 #pragma once
 
+#include <memory>
+
+#include "core/curve/reduced_average.h"
 #include "core/curve/smoothing_flow.h"
-#include "core/mesh/alignment.h"
-#include "core/mesh/coarsening.h"
-#include "core/reduction/subspace.h"
 
 namespace shaped {
 
@@ -32,28 +32,23 @@ class ReducedCurve {
   /// A frame of the flow at full resolution, where its ghost is. V x 3.
   Vertices fine(std::size_t i, const FlowFrame& frame) const;
 
-  const Coarsening& ghost() const { return ghost_; }
-  Eigen::Index dimension() const { return shared_.dimension(); }
+  const GhostSpace& space() const { return *space_; }
 
  private:
   /// What is of one frame alone.
   struct Frame {
-    Eigen::VectorXd missing;      ///< n_i, 3V; empty where the shared directions miss nothing
-    Eigen::MatrixXd ghost_basis;  ///< 3G x (d + 1)
-    Eigen::VectorXd start;        ///< coordinates at the beginning
-    Eigen::MatrixXd inverse;      ///< Hessian's, once it is known
+    FrameSpace space;
+    Eigen::VectorXd missing;  ///< n_i, 3V; empty where the shared directions miss nothing
+    Eigen::VectorXd start;    ///< coordinates at the beginning
+    Eigen::MatrixXd inverse;  ///< Hessian's, once it is known
   };
 
   void makeFrame(const Vertices& aligned, Frame& frame) const;
   Solved<FlowFrame> average(std::size_t i, const std::vector<AverageTerm>& terms, const FlowFrame& now);
-  Vertices ghostShape(const Frame& frame, const Eigen::VectorXd& coordinates) const;
 
   double bending_;
   ReducedCurveOptions options_;
-  ShapeSubspace shared_;
-  Coarsening ghost_;
-  ShellStructurePtr structure_;  ///< of the ghost mesh
-  Vertices ghost_origin_;
+  std::unique_ptr<const GhostSpace> space_;
   std::vector<Frame> frames_;
   Curve beginning_;  ///< on the ghost mesh, placed
 };

@@ -49,8 +49,8 @@ Curve tremblingCurve() {
   return curve;
 }
 
-Eigen::MatrixXd randomBasis(Eigen::Index rows, Eigen::Index columns) {
-  std::mt19937 random(3);
+Eigen::MatrixXd randomBasis(Eigen::Index rows, Eigen::Index columns, unsigned seed) {
+  std::mt19937 random(seed);
   std::normal_distribution<double> normal;
   return Eigen::MatrixXd::NullaryExpr(rows, columns, [&] { return normal(random) / std::sqrt(double(rows)); });
 }
@@ -59,15 +59,16 @@ Eigen::MatrixXd randomBasis(Eigen::Index rows, Eigen::Index columns) {
 
 TEST_CASE("gradient and Hessian of a reduced average agree with differences") {
   const auto mesh = tube(8, 6);
-  const ShellStructure structure(mesh.topology);
   const std::vector<Vertices> shapes{bend(mesh.vertices, 0.4), jitter(mesh.vertices, 0.02, 1), mesh.vertices};
   std::vector<ShellMeasures> measures;
   for (const auto& shape : shapes) measures.push_back(measure(*mesh.topology, shape));
   const std::vector<AverageTerm> terms{{&measures[0], 0.5}, {&measures[1], 1.2}, {&measures[2], 0.8}};
-  const auto basis = randomBasis(mesh.vertices.size(), 5);
+  const GhostSpace shared(mesh.topology, {mesh.vertices, randomBasis(mesh.vertices.size(), 4, 3)}, {mesh.vertices},
+                          1000);
+  const FrameSpace space{&shared, randomBasis(mesh.vertices.size(), 1, 4)};
   for (const auto symmetry : {EnergySymmetry::kDirected, EnergySymmetry::kSymmetric}) {
     const PairEnergy energy(defaultBending(mesh.vertices), symmetry);
-    ReducedAverage average(structure, energy, terms, mesh.vertices, basis);
+    ReducedAverage average(space, energy, terms);
     const Eigen::VectorXd q = 0.03 * Eigen::VectorXd::Random(5);
     Eigen::VectorXd gradient(5), unused(5), above(5), below(5);
     average(q, gradient);
@@ -77,7 +78,7 @@ TEST_CASE("gradient and Hessian of a reduced average agree with differences") {
             Approx(gradient[j]).epsilon(1e-6).margin(1e-8 * gradient.norm()));
     }
     // at rest no element is indefinite, and the Hessian is exact
-    ReducedAverage rest(structure, energy, {{&measures[2], 2.0}}, mesh.vertices, basis);
+    ReducedAverage rest(space, energy, {{&measures[2], 2.0}});
     const auto hessian = rest.hessian(Eigen::VectorXd::Zero(5));
     for (int j = 0; j < 5; ++j) {
       const Eigen::VectorXd step = 1e-5 * Eigen::VectorXd::Unit(5, j);
@@ -94,9 +95,9 @@ TEST_CASE("a reduced curve holds its frames where they are, whatever its dimensi
   const auto curve = wavingCurve(9);
   for (const auto& [dimension, ghost] : {std::pair{2, 60}, std::pair{4, 302}, std::pair{40, 150}}) {
     ReducedCurve reduced(pipe().topology, bending(), curve, {.dimension = dimension, .ghost_vertices = ghost});
-    CHECK(reduced.dimension() <= std::min(dimension, 8));
-    CHECK(reduced.dimension() >= 2);
-    CHECK(reduced.ghost().coarse->vertexCount() <= ghost);
+    CHECK(reduced.space().dimension() <= std::min(dimension, 8));
+    CHECK(reduced.space().dimension() >= 2);
+    CHECK(reduced.space().topology()->vertexCount() <= ghost);
     const auto flow = reduced.flow({});
     for (std::size_t i = 0; i < curve.size(); ++i)
       CHECK((reduced.fine(i, flow.frame(i)) - curve.frames[i]).norm() < 1e-8);
