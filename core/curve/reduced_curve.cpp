@@ -2,11 +2,9 @@
 
 #include <tbb/parallel_for.h>
 
-#include <Eigen/Dense>
 #include <algorithm>
 
 #include "core/mesh/alignment.h"
-#include "core/numerics/bfgs.h"
 #include "core/numerics/error.h"
 
 namespace shaped {
@@ -40,45 +38,34 @@ ReducedCurve::ReducedCurve(const TopologyPtr& topology, double bending, const Cu
   space_ =
       std::make_unique<const GhostSpace>(topology, principalSubspace(curve.frames[central], aligned, options.dimension),
                                          ghostShapes(curve, central), options.ghost_vertices, options.stop);
-  tbb::parallel_for(std::size_t{0}, curve.size(), [&](std::size_t i) { makeFrame(aligned[i], frames_[i]); });
+  tbb::parallel_for(std::size_t{0}, curve.size(), [&](std::size_t i) { frames_[i] = frameOf(aligned[i]); });
   beginning_.closed = curve.closed;
   for (const auto& frame : curve.frames) beginning_.frames.push_back(space_->restrict(frame));
 }
 
-void ReducedCurve::makeFrame(const Vertices& aligned, Frame& frame) const {
+ReducedCurve::Frame ReducedCurve::frameOf(const Vertices& aligned) const {
   const auto& shared = space_->fine();
   const auto own = including(shared, aligned);
-  frame.start = own.coordinates(aligned);
-  frame.space.shared = space_.get();
-  if (own.dimension() == shared.dimension()) return;
+  Frame frame{{space_.get()}, {}, own.coordinates(aligned)};
+  if (own.dimension() == shared.dimension()) return frame;
   frame.missing = own.basis.rightCols<1>();
   frame.space.own = space_->restrict(frame.missing);
+  return frame;
 }
 
-SmoothingFlow ReducedCurve::flow(const SmoothingFlowOptions& options) {
+SmoothingFlow ReducedCurve::flow(const SmoothingFlowOptions& options) const {
   std::vector<Eigen::VectorXd> coordinates;
-  for (const auto& frame : frames_) coordinates.push_back(frame.start);
-  return SmoothingFlow(
-      space_->topology(), bending_, beginning_, std::move(coordinates),
-      [this](std::size_t i, const std::vector<AverageTerm>& terms, const FlowFrame& now) {
-        return average(i, terms, now);
-      },
-      options);
-}
-
-Solved<FlowFrame> ReducedCurve::average(std::size_t i, const std::vector<AverageTerm>& terms, const FlowFrame& now) {
-  auto& frame = frames_[i];
-  ReducedAverage function(frame.space, {bending_, options_.symmetry}, terms);
-  if (frame.inverse.size() == 0) {
-    const Eigen::MatrixXd hessian = function.hessian(now.coordinates);
-    const Eigen::MatrixXd ridge = 1e-10 * hessian.trace() * Eigen::MatrixXd::Identity(hessian.rows(), hessian.cols());
-    frame.inverse = (hessian + ridge).llt().solve(Eigen::MatrixXd::Identity(hessian.rows(), hessian.cols()));
+  const auto solvers = std::make_shared<std::vector<ReducedSolver>>();
+  for (const auto& frame : frames_) {
+    coordinates.push_back(frame.start);
+    solvers->emplace_back(frame.space, PairEnergy(bending_, options_.symmetry), options_.tolerance, options.stop);
   }
-  Eigen::VectorXd gradient;
-  const double reference = std::max(function(now.coordinates, gradient), function.noise());
-  const BfgsOptions options{60, options_.tolerance, reference, function.noise(), options_.stop};
-  auto solved = minimiseBfgs(std::ref(function), now.coordinates, frame.inverse, options);
-  return {{frame.space.ghost(solved.solution), solved.solution}, solved};
+  const auto average = [solvers](std::size_t i, const std::vector<AverageTerm>& terms, const FlowFrame& now) {
+    auto& solver = (*solvers)[i];
+    auto solved = solver.average(terms, now.coordinates);
+    return Solved<FlowFrame>({solver.space().ghost(solved.solution), solved.solution}, solved);
+  };
+  return SmoothingFlow(space_->topology(), bending_, beginning_, std::move(coordinates), average, options);
 }
 
 Vertices ReducedCurve::fine(std::size_t i, const FlowFrame& frame) const {

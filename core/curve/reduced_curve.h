@@ -2,8 +2,7 @@
 
 #include <memory>
 
-#include "core/curve/reduced_average.h"
-#include "core/curve/smoothing_flow.h"
+#include "core/curve/reduced_solver.h"
 
 namespace shaped {
 
@@ -26,8 +25,8 @@ class ReducedCurve {
   /// Throws as requireCurve. Runs parallel loops in the current TBB arena.
   ReducedCurve(const TopologyPtr& topology, double bending, const Curve& curve, const ReducedCurveOptions& options);
 
-  /// The flow of this curve. Its frames are those of the ghost mesh; the ReducedCurve must outlive it.
-  SmoothingFlow flow(const SmoothingFlowOptions& options);
+  /// A flow of this curve. Its frames are those of the ghost mesh; the ReducedCurve must outlive it.
+  SmoothingFlow flow(const SmoothingFlowOptions& options) const;
 
   /// A frame of the flow at full resolution, where its ghost is. V x 3.
   Vertices fine(std::size_t i, const FlowFrame& frame) const;
@@ -40,11 +39,9 @@ class ReducedCurve {
     FrameSpace space;
     Eigen::VectorXd missing;  ///< n_i, 3V; empty where the shared directions miss nothing
     Eigen::VectorXd start;    ///< coordinates at the beginning
-    Eigen::MatrixXd inverse;  ///< Hessian's, once it is known
   };
 
-  void makeFrame(const Vertices& aligned, Frame& frame) const;
-  Solved<FlowFrame> average(std::size_t i, const std::vector<AverageTerm>& terms, const FlowFrame& now);
+  Frame frameOf(const Vertices& aligned) const;
 
   double bending_;
   ReducedCurveOptions options_;

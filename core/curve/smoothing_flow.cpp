@@ -153,6 +153,10 @@ Solved<SmoothingStep> SmoothingFlow::step() {
     auto next = moved(tau, weights);
     total = {next.termination, total.iterations + next.iterations, next.residual};
     if (total.termination == Termination::kCancelled) break;
+    if (total.converged() && next.iterations == 0) {  // no frame has anything to gain
+      total.termination = Termination::kStalled;
+      break;
+    }
     const double after = total.converged() ? next.solution.functional(weights) : before;
     if (total.converged() && (after < before - weights.noise || !options_.control)) {
       now_ = std::move(next.solution);

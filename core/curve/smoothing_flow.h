@@ -71,9 +71,9 @@ class SmoothingFlow {
   SmoothingFlow(TopologyPtr topology, double bending, Curve curve, std::vector<Eigen::VectorXd> coordinates,
                 FrameAverage average, SmoothingFlowOptions options);
 
-  /// Takes a step. Converged: the step was taken. Stalled: no step of a reasonable length lowers F, which is so at a
-  /// stationary curve; the curve is as before. The residual is the largest of the frames' solves. Runs a parallel loop
-  /// over the frames in the current TBB arena.
+  /// Takes a step. Converged: the step was taken. Stalled: no frame's average differs from it beyond the tolerance of
+  /// its solve, or no step of a reasonable length lowers F; so it is at a stationary curve, which stays as it was. The
+  /// residual is the largest of the frames' solves. Runs a parallel loop over the frames in the current TBB arena.
   Solved<SmoothingStep> step();
 
   const Curve& curve() const { return now_.curve; }

@@ -94,7 +94,7 @@ TEST_CASE("gradient and Hessian of a reduced average agree with differences") {
 TEST_CASE("a reduced curve holds its frames where they are, whatever its dimension and ghost mesh") {
   const auto curve = wavingCurve(9);
   for (const auto& [dimension, ghost] : {std::pair{2, 60}, std::pair{4, 302}, std::pair{40, 150}}) {
-    ReducedCurve reduced(pipe().topology, bending(), curve, {.dimension = dimension, .ghost_vertices = ghost});
+    const ReducedCurve reduced(pipe().topology, bending(), curve, {.dimension = dimension, .ghost_vertices = ghost});
     CHECK(reduced.space().dimension() <= std::min(dimension, 8));
     CHECK(reduced.space().dimension() >= 2);
     CHECK(reduced.space().topology()->vertexCount() <= ghost);
@@ -111,7 +111,7 @@ TEST_CASE("the reduced flow lowers the path energy in every step and comes near 
   SmoothingFlow full(structure, {bending(), EnergySymmetry::kDirected}, curve, {});
   for (int k = 0; k < kSteps; ++k) REQUIRE(full.step().converged());
   for (const int ghost : {302, 120}) {
-    ReducedCurve reduced(pipe().topology, bending(), curve, {.dimension = 8, .ghost_vertices = ghost});
+    const ReducedCurve reduced(pipe().topology, bending(), curve, {.dimension = 8, .ghost_vertices = ghost});
     auto flow = reduced.flow({});
     double last = flow.pathEnergy();
     for (int k = 0; k < kSteps; ++k) {
@@ -135,7 +135,7 @@ TEST_CASE("the reduced flow lowers the path energy in every step and comes near 
 TEST_CASE("a reduced flow that is stopped leaves its curve as it was") {
   std::stop_source stop;
   const auto curve = wavingCurve(6);
-  ReducedCurve reduced(pipe().topology, bending(), curve, {.dimension = 4, .stop = stop.get_token()});
+  const ReducedCurve reduced(pipe().topology, bending(), curve, {.dimension = 4, .stop = stop.get_token()});
   auto flow = reduced.flow({.stop = stop.get_token()});
   stop.request_stop();
   CHECK(flow.step().termination == Termination::kCancelled);

@@ -1,0 +1,44 @@
+#pragma once
+
+#include <optional>
+#include "core/curve/curve.h"
+#include "core/numerics/progress.h"
+
+#include "core/numerics/solved.h"
+
+namespace shaped {
+
+struct GeodesicFlowOptions {
+  int frames = 64;                                       ///< of the geodesic with both ends, >= 2
+  int insert = 3;                                        ///< frames between two at each temporal refinement, >= 1
+  int dimension = 14;                                    ///< of the subspace, >= 1
+  std::int32_t ghost_vertices = 1250;                    ///< of the mesh on which energies are evaluated, >= 4
+  EnergySymmetry symmetry = EnergySymmetry::kSymmetric;  ///< of the averages: (1), or (10) at half the cost
+  /// When a frame is where it belongs: sqrt(gain / energy of its two segments), > 0.
+  double tolerance = 1e-4;
+  int steps = 500;  ///< of the flow at most, on each level, >= 1
+  std::stop_token stop = {};
+
+  /// "frames = 1, want >= 2"; empty when all is well.
+  std::optional<std::string> firstViolation() const;
+};
+
+struct GeodesicFlow {
+  Curve curve;              ///< its ends are a and b themselves
+  double path_energy = 0;   ///< (4) on the ghost mesh [m^2]
+  std::int64_t solves = 0;  ///< iterations of all frames' solves
+};
+
+/// A discrete geodesic from a to b by the curve smoothing flow in a subspace ([BvTH16] sections 6 and 7): starting from
+/// the two ends, frames are inserted as averages of their neighbours and the flow runs until no frame has anything to
+/// gain, level after level. The subspace is krylovSubspace(). Shapes between turn and travel evenly from a's position
+/// to b's.
+///
+/// Iteration limit: a level did not become stationary in so many steps. Numerical failure: a shape is too close to
+/// degenerate. Throws InvalidInput naming "a", "b", "topology" or "options". Runs parallel loops in the current TBB
+/// arena.
+Solved<GeodesicFlow> geodesicByFlow(const ShellStructurePtr& structure, double bending, const Vertices& a,
+                                    const Vertices& b, const GeodesicFlowOptions& options,
+                                    const ProgressSink& progress = {});
+
+}  // namespace shaped

@@ -1,0 +1,28 @@
+#pragma once
+
+#include "core/curve/reduced_average.h"
+#include "core/curve/smoothing_flow.h"
+
+namespace shaped {
+
+/// Averages of one frame within its space, one after the other: by the BFGS method, from an inverse Hessian that is
+/// computed at the first and kept up to date. For one thread at a time.
+class ReducedSolver {
+ public:
+  /// tolerance: of sqrt(gain that is left / energy of the terms at the start), > 0.
+  ReducedSolver(FrameSpace space, const PairEnergy& energy, double tolerance, std::stop_token stop)
+      : space_(std::move(space)), energy_(energy), tolerance_(tolerance), stop_(std::move(stop)) {}
+
+  const FrameSpace& space() const { return space_; }
+  /// The coordinates of the average. No iterations: the start had nothing to gain.
+  Solved<Eigen::VectorXd> average(const std::vector<AverageTerm>& terms, const Eigen::VectorXd& start);
+
+ private:
+  FrameSpace space_;
+  PairEnergy energy_;
+  double tolerance_;
+  std::stop_token stop_;
+  Eigen::MatrixXd inverse_;
+};
+
+}  // namespace shaped

@@ -1,0 +1,22 @@
+#include "core/reduction/ghost_space.h"
+
+namespace shaped {
+
+GhostSpace::GhostSpace(const TopologyPtr& topology, ShapeSubspace subspace, const std::vector<Vertices>& shapes,
+                       std::int32_t vertices, const std::stop_token& stop)
+    : fine_(std::move(subspace)),
+      coarsening_(coarsen(topology, shapes, {vertices, {}, stop})),
+      structure_(std::make_shared<const ShellStructure>(coarsening_.coarse)),
+      origin_(restrict(fine_.origin)),
+      basis_(origin_.size(), fine_.dimension()) {
+  for (Eigen::Index j = 0; j < basis_.cols(); ++j) basis_.col(j) = restrict(Eigen::VectorXd(fine_.basis.col(j)));
+}
+
+Eigen::VectorXd GhostSpace::restrict(const Eigen::VectorXd& vector) const {
+  Eigen::VectorXd rows(3 * static_cast<Eigen::Index>(coarsening_.kept.size()));
+  for (std::size_t i = 0; i < coarsening_.kept.size(); ++i)
+    rows.segment<3>(3 * static_cast<Eigen::Index>(i)) = vector.segment<3>(3 * coarsening_.kept[i]);
+  return rows;
+}
+
+}  // namespace shaped

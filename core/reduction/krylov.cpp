@@ -1,0 +1,117 @@
+#include "core/reduction/krylov.h"
+
+#include <Eigen/Dense>
+#include <optional>
+
+#include "core/shell/energy.h"
+
+namespace shaped {
+namespace {
+
+using Vector = Eigen::VectorXd;
+
+Eigen::Map<const Vector> flat(const Vertices& shape) { return {shape.data(), shape.size()}; }
+
+/// Orthonormal infinitesimal rigid motions of a shape, 3V x 6.
+Eigen::MatrixXd rigidMotions(const Vertices& shape) {
+  const Vertices centred = shape.rowwise() - shape.colwise().mean();
+  Eigen::MatrixXd motions = Eigen::MatrixXd::Zero(shape.size(), 6);
+  for (Eigen::Index v = 0; v < shape.rows(); ++v)
+    for (int axis = 0; axis < 3; ++axis) {
+      const int next = (axis + 1) % 3, last = (axis + 2) % 3;
+      motions(3 * v + axis, axis) = 1;
+      motions(3 * v + next, 3 + axis) = -centred(v, last);
+      motions(3 * v + last, 3 + axis) = centred(v, next);
+    }
+  return Eigen::HouseholderQR<Eigen::MatrixXd>(motions).householderQ() * Eigen::MatrixXd::Identity(shape.size(), 6);
+}
+
+/// Linear elasticity about one shape.
+class RestingShape {
+ public:
+  RestingShape(const ShellStructurePtr& structure, double bending, const Vertices& shape, const std::stop_token& stop)
+      : topology_(structure->topology()),
+        bending_(bending),
+        shape_(shape),
+        measures_(measure(topology_, shape)),
+        rigid_(rigidMotions(shape)),
+        masses_(Vector::Zero(shape.size())),
+        pins_(gaugePins(shape)),
+        factor_(structure->analysis()) {
+    for (Eigen::Index f = 0; f < topology_.faces().rows(); ++f)
+      for (int c = 0; c < 3; ++c) masses_.segment<3>(3 * topology_.faces()(f, c)).array() += measures_.area[f] / 3;
+    MeasureCurvature curvature(topology_, HessianKind::kExact);
+    addSecondCurvature(topology_, measures_, measures_, bending, 1, curvature);
+    SymmetricBlockMatrix hessian(structure->pattern());
+    pullBackHessian(*structure, shape, curvature, hessian);
+    usable_ = factor_.factorise(hessian, pins_, stop);
+  }
+
+  bool usable() const { return usable_; }
+  const ShellMeasures& measures() const { return measures_; }
+
+  /// The linearised deformation towards another shape.
+  Vector towards(const ShellMeasures& other) const {
+    MeasureGradient gradient(topology_);
+    addSecondGradient(topology_, other, measures_, bending_, 1, gradient);
+    Vertices force = Vertices::Zero(shape_.rows(), 3);
+    pullBackGradient(topology_, shape_, gradient, force);
+    return solve(-flat(force));
+  }
+  Vector smoother(const Vector& direction) const { return solve(masses_.cwiseProduct(direction)); }
+
+ private:
+  /// H^-1 of a load without its rigid part, which H cannot carry; without a rigid part itself.
+  Vector solve(Vector load) const {
+    load -= rigid_ * (rigid_.transpose() * load);
+    pins_.clear(load.data());
+    Vector result(load.size());
+    factor_.solve(load.data(), result.data());
+    return result - rigid_ * (rigid_.transpose() * result);
+  }
+
+  const Topology& topology_;
+  double bending_;
+  const Vertices& shape_;
+  ShellMeasures measures_;
+  Eigen::MatrixXd rigid_;
+  Vector masses_;
+  Pins pins_;
+  CholeskyFactor factor_;
+  bool usable_ = false;
+};
+
+/// Appends what is new in a direction; false when nothing is.
+bool append(const Vector& direction, Eigen::MatrixXd& basis) {
+  Vector rest = direction.normalized();
+  for (int pass = 0; pass < 2; ++pass) rest -= basis * (basis.transpose() * rest);
+  if (!(rest.norm() > 1e-7)) return false;
+  basis.conservativeResize(Eigen::NoChange, basis.cols() + 1);
+  basis.rightCols<1>() = rest.normalized();
+  return true;
+}
+
+}  // namespace
+
+Solved<ShapeSubspace> krylovSubspace(const ShellStructurePtr& structure, double bending, const Vertices& a,
+                                     const Vertices& b, int dimension, const std::stop_token& stop) {
+  ShapeSubspace result{a, Eigen::MatrixXd(a.size(), 0)};
+  const auto ended = [&](Termination termination) {
+    return Solved<ShapeSubspace>(std::move(result), {termination, 0, 0});
+  };
+  if (!append(flat(b) - flat(a), result.basis)) return ended(Termination::kConverged);  // the shapes are equal
+  const RestingShape at_a(structure, bending, a, stop), at_b(structure, bending, b, stop);
+  if (stop.stop_requested()) return ended(Termination::kCancelled);
+  if (!at_a.usable() || !at_b.usable()) return ended(Termination::kNumericalFailure);
+  Vector from_a = at_a.towards(at_b.measures()), from_b = at_b.towards(at_a.measures());
+  for (bool more = true; more && result.dimension() < dimension;) {
+    if (stop.stop_requested()) return ended(Termination::kCancelled);
+    more = append(from_a, result.basis);
+    if (result.dimension() < dimension) more = append(from_b, result.basis) || more;
+    from_a = at_a.smoother(from_a);
+    from_b = at_b.smoother(from_b);
+  }
+  return ended(Termination::kConverged);
+}
+
+}  // namespace shaped
