@@ -103,13 +103,15 @@ Solved<ShapeSubspace> krylovSubspace(const ShellStructurePtr& structure, double 
   const RestingShape at_a(structure, bending, a, stop), at_b(structure, bending, b, stop);
   if (stop.stop_requested()) return ended(Termination::kCancelled);
   if (!at_a.usable() || !at_b.usable()) return ended(Termination::kNumericalFailure);
+  // Each sequence goes on from what was new in its last vector: the powers themselves would soon all look the same.
   Vector from_a = at_a.towards(at_b.measures()), from_b = at_b.towards(at_a.measures());
-  for (bool more = true; more && result.dimension() < dimension;) {
+  while (result.dimension() < dimension && (from_a.size() > 0 || from_b.size() > 0)) {
     if (stop.stop_requested()) return ended(Termination::kCancelled);
-    more = append(from_a, result.basis);
-    if (result.dimension() < dimension) more = append(from_b, result.basis) || more;
-    from_a = at_a.smoother(from_a);
-    from_b = at_b.smoother(from_b);
+    for (auto [shape, next] : {std::pair{&at_a, &from_a}, std::pair{&at_b, &from_b}}) {
+      if (next->size() == 0 || result.dimension() == dimension) continue;
+      const bool more = append(*next, result.basis);
+      *next = more ? shape->smoother(result.basis.rightCols<1>()) : Vector();
+    }
   }
   return ended(Termination::kConverged);
 }
