@@ -6,6 +6,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "core/curve/flow_tangents.h"
 #include "core/curve/reduced_solver.h"
 #include "core/mesh/alignment.h"
 #include "core/numerics/error.h"
@@ -35,8 +36,8 @@ class Travel {
 
 class Refinement {
  public:
-  Refinement(const GhostSpace& space, double bending, const GeodesicFlowOptions& options)
-      : space_(space), bending_(bending), options_(options) {}
+  Refinement(const ShellStructurePtr& structure, GhostSpace& space, double bending, const GeodesicFlowOptions& options)
+      : structure_(structure), space_(space), bending_(bending), options_(options) {}
 
   /// Coordinates of a geodesic with as many frames as wanted between the two given.
   Solved<std::vector<Eigen::VectorXd>> run(const Eigen::VectorXd& from, const Eigen::VectorXd& to,
@@ -48,6 +49,7 @@ class Refinement {
       const auto segments = (path.size() - 1) * static_cast<std::size_t>(options_.insert + 1);
       path = refined(path, std::min(segments, wanted - 1) + 1);
       result += flow(path);
+      if (path.size() >= std::min(kRough, wanted)) enrich(path, result);
       if (progress)
         progress({std::to_string(path.size()) + " frames",
                   static_cast<double>(path.size()) / static_cast<double>(wanted), result.residual});
@@ -55,8 +57,32 @@ class Refinement {
     return result;
   }
   double pathEnergy() const { return path_energy_; }
+  double fullResidual() const { return full_residual_; }
 
  private:
+  static constexpr std::size_t kRough = 5;  ///< frames of a geodesic whose tangents enrich the subspace
+
+  /// Adds the flow tangents of the path and lets it flow again, as often as is left to do.
+  void enrich(std::vector<Eigen::VectorXd>& path, Outcome& outcome) {
+    for (; enrichments_ < options_.enrichments && path.size() > 2; ++enrichments_) {
+      if (outcome.termination == Termination::kCancelled) return;
+      Curve curve{{}, false};
+      for (const auto& coordinates : path) curve.frames.push_back(space_.fine().shape(coordinates));
+      const auto tangents = flowTangents(structure_, bending_, curve, options_.stop);
+      full_residual_ = tangents.residual;
+      bool more = false;
+      for (const auto& direction : tangents.directions)
+        if (direction.size() > 0) more = space_.append(direction) || more;
+      if (!more) return;
+      for (auto& coordinates : path) {
+        const auto before = coordinates.size();
+        coordinates.conservativeResize(space_.dimension());
+        coordinates.tail(space_.dimension() - before).setZero();
+      }
+      outcome += flow(path);
+    }
+  }
+
   /// Frames at even steps along the old ones: averages of the two around each.
   std::vector<Eigen::VectorXd> refined(const std::vector<Eigen::VectorXd>& old, std::size_t frames) const {
     std::vector<Eigen::VectorXd> path(frames);
@@ -104,10 +130,12 @@ class Refinement {
     return outcome;
   }
 
-  const GhostSpace& space_;
+  const ShellStructurePtr& structure_;
+  GhostSpace& space_;
   double bending_;
   const GeodesicFlowOptions& options_;
-  double path_energy_ = 0;
+  int enrichments_ = 0;
+  double path_energy_ = 0, full_residual_ = 0;
 };
 
 }  // namespace
@@ -120,6 +148,7 @@ std::optional<std::string> GeodesicFlowOptions::firstViolation() const {
   if (insert < 1) return whole("insert", insert, 1);
   if (dimension < 1) return whole("dimension", dimension, 1);
   if (ghost_vertices < 4) return whole("ghost_vertices", ghost_vertices, 4);
+  if (enrichments < 0) return whole("enrichments", enrichments, 0);
   if (steps < 1) return whole("steps", steps, 1);
   if (!(tolerance > 0)) return "tolerance = " + std::to_string(tolerance) + ", want > 0";
   return std::nullopt;
@@ -134,13 +163,13 @@ Solved<GeodesicFlow> geodesicByFlow(const ShellStructurePtr& structure, double b
   requireValidShape(structure->topology(), b, "b");
   const auto onto_a = alignRigidly(b, a);
   const Vertices aligned = apply(onto_a, b);
-  Solved<GeodesicFlow> result({Curve{{a, b}, false}, 0, 0}, {});
+  Solved<GeodesicFlow> result({Curve{{a, b}, false}, 0, 0, 0}, {});
   auto subspace = krylovSubspace(structure, bending, a, aligned, options.dimension, options.stop);
   if (!subspace.converged()) return {std::move(result.solution), subspace};
   const Eigen::VectorXd end = subspace.solution.coordinates(aligned);
-  const GhostSpace space(structure->topologyPtr(), std::move(subspace.solution), {a, aligned}, options.ghost_vertices,
-                         options.stop);
-  Refinement refinement(space, bending, options);
+  GhostSpace space(structure->topologyPtr(), std::move(subspace.solution), {a, aligned}, options.ghost_vertices,
+                   options.stop);
+  Refinement refinement(structure, space, bending, options);
   const auto path = refinement.run(Eigen::VectorXd::Zero(end.size()), end, progress);
   if (path.termination == Termination::kCancelled) return {std::move(result.solution), path};
 
@@ -153,7 +182,8 @@ Solved<GeodesicFlow> geodesicByFlow(const ShellStructurePtr& structure, double b
         travel(space.fine().shape(path.solution[i]), static_cast<double>(i) / static_cast<double>(frames.size() - 1));
   });
   result.solution.path_energy = refinement.pathEnergy();
-  result.solution.solves = path.iterations;
+  result.solution.dimension = space.dimension();
+  result.solution.full_residual = refinement.fullResidual();
   return {std::move(result.solution), path};
 }
 

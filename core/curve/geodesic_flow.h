@@ -9,10 +9,11 @@
 namespace shaped {
 
 struct GeodesicFlowOptions {
-  int frames = 64;                                       ///< of the geodesic with both ends, >= 2
-  int insert = 3;                                        ///< frames between two at each temporal refinement, >= 1
-  int dimension = 14;                                    ///< of the subspace, >= 1
-  std::int32_t ghost_vertices = 1250;                    ///< of the mesh on which energies are evaluated, >= 4
+  int frames = 64;                     ///< of the geodesic with both ends, >= 2
+  int insert = 3;                      ///< frames between two at each temporal refinement, >= 1
+  int dimension = 14;                  ///< of the Krylov subspace to begin with, >= 1
+  int enrichments = 2;                 ///< of the subspace by the flow tangents of a rough geodesic, >= 0
+  std::int32_t ghost_vertices = 1250;  ///< of the mesh on which energies are evaluated, >= 4
   EnergySymmetry symmetry = EnergySymmetry::kSymmetric;  ///< of the averages: (1), or (10) at half the cost
   /// When a frame is where it belongs: sqrt(gain / energy of its two segments), > 0.
   double tolerance = 1e-4;
@@ -24,15 +25,18 @@ struct GeodesicFlowOptions {
 };
 
 struct GeodesicFlow {
-  Curve curve;              ///< its ends are a and b themselves
-  double path_energy = 0;   ///< (4) on the ghost mesh [m^2]
-  std::int64_t solves = 0;  ///< iterations of all frames' solves
+  Curve curve;                 ///< its ends are a and b themselves
+  double path_energy = 0;      ///< (4) on the ghost mesh [m^2]
+  Eigen::Index dimension = 0;  ///< of the subspace in the end
+  /// Of the rough geodesic at full resolution before the last enrichment, as FlowTangents::residual; 0 without one.
+  double full_residual = 0;
 };
 
 /// A discrete geodesic from a to b by the curve smoothing flow in a subspace ([BvTH16] sections 6 and 7): starting from
 /// the two ends, frames are inserted as averages of their neighbours and the flow runs until no frame has anything to
-/// gain, level after level. The subspace is krylovSubspace(). Shapes between turn and travel evenly from a's position
-/// to b's.
+/// gain, level after level. The subspace is krylovSubspace(), enriched (ours): the rough geodesic of some five frames
+/// tells by its flow tangents at full resolution where it wants to leave the subspace, and these directions are added.
+/// Shapes between turn and travel evenly from a's position to b's.
 ///
 /// Iteration limit: a level did not become stationary in so many steps. Numerical failure: a shape is too close to
 /// degenerate. Throws InvalidInput naming "a", "b", "topology" or "options". Runs parallel loops in the current TBB

@@ -12,6 +12,13 @@ GhostSpace::GhostSpace(const TopologyPtr& topology, ShapeSubspace subspace, cons
   for (Eigen::Index j = 0; j < basis_.cols(); ++j) basis_.col(j) = restrict(Eigen::VectorXd(fine_.basis.col(j)));
 }
 
+bool GhostSpace::append(const Eigen::VectorXd& direction) {
+  if (!fine_.append(direction)) return false;
+  basis_.conservativeResize(Eigen::NoChange, basis_.cols() + 1);
+  basis_.rightCols<1>() = restrict(Eigen::VectorXd(fine_.basis.rightCols<1>()));
+  return true;
+}
+
 Eigen::VectorXd GhostSpace::restrict(const Eigen::VectorXd& vector) const {
   Eigen::VectorXd rows(3 * static_cast<Eigen::Index>(coarsening_.kept.size()));
   for (std::size_t i = 0; i < coarsening_.kept.size(); ++i)

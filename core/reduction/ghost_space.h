@@ -24,6 +24,8 @@ class GhostSpace {
   const Eigen::MatrixXd& basis() const { return basis_; }  ///< 3G x d, the columns not orthonormal
 
   Vertices restrict(const Vertices& shape) const { return restrictTo(coarsening_, shape); }
+  /// Adds a direction, 3V, as ShapeSubspace::append.
+  bool append(const Eigen::VectorXd& direction);
   /// The rows of a 3V vector that belong to the ghost's vertices.
   Eigen::VectorXd restrict(const Eigen::VectorXd& vector) const;
 

@@ -1,8 +1,5 @@
 #include "core/reduction/krylov.h"
 
-#include <Eigen/Dense>
-#include <optional>
-
 #include "core/shell/energy.h"
 
 namespace shaped {
@@ -12,20 +9,6 @@ using Vector = Eigen::VectorXd;
 
 Eigen::Map<const Vector> flat(const Vertices& shape) { return {shape.data(), shape.size()}; }
 
-/// Orthonormal infinitesimal rigid motions of a shape, 3V x 6.
-Eigen::MatrixXd rigidMotions(const Vertices& shape) {
-  const Vertices centred = shape.rowwise() - shape.colwise().mean();
-  Eigen::MatrixXd motions = Eigen::MatrixXd::Zero(shape.size(), 6);
-  for (Eigen::Index v = 0; v < shape.rows(); ++v)
-    for (int axis = 0; axis < 3; ++axis) {
-      const int next = (axis + 1) % 3, last = (axis + 2) % 3;
-      motions(3 * v + axis, axis) = 1;
-      motions(3 * v + next, 3 + axis) = -centred(v, last);
-      motions(3 * v + last, 3 + axis) = centred(v, next);
-    }
-  return Eigen::HouseholderQR<Eigen::MatrixXd>(motions).householderQ() * Eigen::MatrixXd::Identity(shape.size(), 6);
-}
-
 /// Linear elasticity about one shape.
 class RestingShape {
  public:
@@ -34,7 +17,7 @@ class RestingShape {
         bending_(bending),
         shape_(shape),
         measures_(measure(topology_, shape)),
-        rigid_(rigidMotions(shape)),
+        rigid_(infinitesimalRigidMotions(shape)),
         masses_(Vector::Zero(shape.size())),
         pins_(gaugePins(shape)),
         factor_(structure->analysis()) {
@@ -81,16 +64,6 @@ class RestingShape {
   bool usable_ = false;
 };
 
-/// Appends what is new in a direction; false when nothing is.
-bool append(const Vector& direction, Eigen::MatrixXd& basis) {
-  Vector rest = direction.normalized();
-  for (int pass = 0; pass < 2; ++pass) rest -= basis * (basis.transpose() * rest);
-  if (!(rest.norm() > 1e-7)) return false;
-  basis.conservativeResize(Eigen::NoChange, basis.cols() + 1);
-  basis.rightCols<1>() = rest.normalized();
-  return true;
-}
-
 }  // namespace
 
 Solved<ShapeSubspace> krylovSubspace(const ShellStructurePtr& structure, double bending, const Vertices& a,
@@ -99,7 +72,7 @@ Solved<ShapeSubspace> krylovSubspace(const ShellStructurePtr& structure, double 
   const auto ended = [&](Termination termination) {
     return Solved<ShapeSubspace>(std::move(result), {termination, 0, 0});
   };
-  if (!append(flat(b) - flat(a), result.basis)) return ended(Termination::kConverged);  // the shapes are equal
+  if (!result.append(flat(b) - flat(a))) return ended(Termination::kConverged);  // the shapes are equal
   const RestingShape at_a(structure, bending, a, stop), at_b(structure, bending, b, stop);
   if (stop.stop_requested()) return ended(Termination::kCancelled);
   if (!at_a.usable() || !at_b.usable()) return ended(Termination::kNumericalFailure);
@@ -109,7 +82,7 @@ Solved<ShapeSubspace> krylovSubspace(const ShellStructurePtr& structure, double 
     if (stop.stop_requested()) return ended(Termination::kCancelled);
     for (auto [shape, next] : {std::pair{&at_a, &from_a}, std::pair{&at_b, &from_b}}) {
       if (next->size() == 0 || result.dimension() == dimension) continue;
-      const bool more = append(*next, result.basis);
+      const bool more = result.append(*next);
       *next = more ? shape->smoother(result.basis.rightCols<1>()) : Vector();
     }
   }

@@ -1,6 +1,7 @@
 #include "core/reduction/subspace.h"
 
 #include <Eigen/Eigenvalues>
+#include <Eigen/QR>
 #include <algorithm>
 
 #include "core/mesh/alignment.h"
@@ -22,6 +23,28 @@ Vertices ShapeSubspace::shape(const Eigen::VectorXd& coordinates) const {
 
 Eigen::VectorXd ShapeSubspace::coordinates(const Vertices& shape) const {
   return basis.transpose() * (flat(shape) - flat(origin));
+}
+
+bool ShapeSubspace::append(const Eigen::VectorXd& direction) {
+  Eigen::VectorXd rest = direction.normalized();
+  for (int pass = 0; pass < 2; ++pass) rest -= basis * (basis.transpose() * rest);
+  if (!(rest.norm() > 1e-7)) return false;
+  basis.conservativeResize(Eigen::NoChange, basis.cols() + 1);
+  basis.rightCols<1>() = rest.normalized();
+  return true;
+}
+
+Eigen::MatrixXd infinitesimalRigidMotions(const Vertices& shape) {
+  const Vertices centred = shape.rowwise() - shape.colwise().mean();
+  Eigen::MatrixXd motions = Eigen::MatrixXd::Zero(shape.size(), 6);
+  for (Eigen::Index v = 0; v < shape.rows(); ++v)
+    for (int axis = 0; axis < 3; ++axis) {
+      const int next = (axis + 1) % 3, last = (axis + 2) % 3;
+      motions(3 * v + axis, axis) = 1;
+      motions(3 * v + next, 3 + axis) = -centred(v, last);
+      motions(3 * v + last, 3 + axis) = centred(v, next);
+    }
+  return Eigen::HouseholderQR<Eigen::MatrixXd>(motions).householderQ() * Eigen::MatrixXd::Identity(shape.size(), 6);
 }
 
 ShapeSubspace principalSubspace(const Vertices& origin, const std::vector<Vertices>& shapes, int dimension) {

@@ -16,7 +16,12 @@ struct ShapeSubspace {
   Vertices shape(const Eigen::VectorXd& coordinates) const;
   /// Of the shape's point nearest in the space.
   Eigen::VectorXd coordinates(const Vertices& shape) const;
+  /// Adds what is new in a direction (3V); false when that is less than 1e-7 of it, and nothing was added.
+  bool append(const Eigen::VectorXd& direction);
 };
+
+/// Orthonormal infinitesimal rigid motions of a shape, 3V x 6: what an energy cannot see.
+Eigen::MatrixXd infinitesimalRigidMotions(const Vertices& shape);
 
 /// The `dimension` directions in which the shapes differ most from the origin: the left singular vectors of their
 /// displacements with the largest singular values ([BvTH16] section 6). Fewer where the displacements span fewer (to

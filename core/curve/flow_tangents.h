@@ -1,0 +1,24 @@
+#pragma once
+
+#include <stop_token>
+
+#include "core/curve/curve.h"
+
+namespace shaped {
+
+/// Which way each inner frame of an open curve would go to lower the path energy (4): Newton's direction of its own
+/// coordinates at full resolution, without its rigid part; [BvTH16] (9) with the Hessian where the frame is instead of
+/// where its neighbours would be on it.
+struct FlowTangents {
+  std::vector<Eigen::VectorXd> directions;  ///< 3V each; empty at the ends and where there is none
+  /// The largest over the frames of |gradient| / (|force towards the one before| + |towards the next|): 0 for a
+  /// geodesic.
+  double residual = 0;
+};
+
+/// The curve may be anywhere, but its frames must be aligned to each other. Stopped: some directions are missing. Runs
+/// a parallel loop in the current TBB arena, with a factorisation for each frame.
+FlowTangents flowTangents(const ShellStructurePtr& structure, double bending, const Curve& curve,
+                          const std::stop_token& stop = {});
+
+}  // namespace shaped
