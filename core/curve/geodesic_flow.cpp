@@ -122,7 +122,7 @@ class Refinement {
       outcome.iterations += step.iterations;
       outcome.residual = step.residual;
       if (step.converged()) continue;
-      outcome.termination = step.termination == Termination::kStalled ? Termination::kConverged : step.termination;
+      outcome.termination = step.solution.stationary ? Termination::kConverged : step.termination;
       break;
     }
     for (std::size_t i = 0; i < path.size(); ++i) path[i] = flow.frame(i).coordinates;

@@ -146,14 +146,15 @@ void SmoothingFlow::evaluate(State& state) const {
 Solved<SmoothingStep> SmoothingFlow::step() {
   const auto weights = coefficients();
   const double before = now_.functional(weights);
-  SmoothingStep taken{0, 0, pathEnergy(), before, before};
+  SmoothingStep taken{0, 0, pathEnergy(), before, before, false};
   Outcome total;
   double tau = options_.control ? std::min(options_.tau, 2 * tau_) : options_.tau;
   for (;; tau /= 2, ++taken.halvings) {
     auto next = moved(tau, weights);
     total = {next.termination, total.iterations + next.iterations, next.residual};
     if (total.termination == Termination::kCancelled) break;
-    if (total.converged() && next.iterations == 0) {  // no frame has anything to gain
+    taken.stationary = total.converged() && next.iterations == 0;
+    if (taken.stationary) {
       total.termination = Termination::kStalled;
       break;
     }
@@ -161,7 +162,7 @@ Solved<SmoothingStep> SmoothingFlow::step() {
     if (total.converged() && (after < before - weights.noise || !options_.control)) {
       now_ = std::move(next.solution);
       tau_ = tau;
-      return {{tau, taken.halvings, pathEnergy(), before, after}, total};
+      return {{tau, taken.halvings, pathEnergy(), before, after, false}, total};
     }
     if (options_.control && tau >= 2 * kShortestStep * options_.tau) continue;
     if (total.converged()) total.termination = Termination::kStalled;

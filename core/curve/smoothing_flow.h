@@ -27,11 +27,12 @@ struct SmoothingFlowOptions {
 
 /// What one step did.
 struct SmoothingStep {
-  double tau = 0;          ///< that was taken; 0: none lowered the functional
-  int halvings = 0;        ///< tried in vain before
-  double path_energy = 0;  ///< (4) after the step [m^2]
-  double before = 0;       ///< the functional before the step [m^2]
-  double after = 0;        ///< and after it
+  double tau = 0;           ///< that was taken; 0: none lowered the functional
+  int halvings = 0;         ///< tried in vain before
+  double path_energy = 0;   ///< (4) after the step [m^2]
+  double before = 0;        ///< the functional before the step [m^2]
+  double after = 0;         ///< and after it
+  bool stationary = false;  ///< no frame had anything to gain: each one is its own average to its solve's tolerance
 };
 
 /// A frame of a flow.
