@@ -31,6 +31,8 @@ void row8RealTrial();
 void row9VirtualTrials();
 void row10HandleEdits();
 void row11RigidMotions();
+/// Row "curves".
+void curves();
 /// Row "stop".
 void stopLatency();
 
