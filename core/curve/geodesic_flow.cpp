@@ -115,7 +115,8 @@ class Refinement {
       auto solved = solvers[i].average(terms, now.coordinates);
       return Solved<FlowFrame>({solvers[i].space().ghost(solved.solution), solved.solution}, solved);
     };
-    SmoothingFlow flow(space_.topology(), bending_, curve, path, average, {.tau = 1, .stop = options_.stop});
+    SmoothingFlow flow(space_.topology(), bending_, curve, path, average,
+                       {.tau = 1, .place = false, .stop = options_.stop});
     Outcome outcome{Termination::kIterationLimit, 0, 0};
     for (int k = 0; k < options_.steps; ++k) {
       const auto step = flow.step();

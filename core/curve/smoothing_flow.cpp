@@ -7,6 +7,7 @@
 #include <numeric>
 
 #include "core/mesh/alignment.h"
+#include "core/mesh/quality.h"
 #include "core/numerics/error.h"
 
 namespace shaped {
@@ -81,6 +82,13 @@ bool SmoothingFlow::free(std::size_t i) const {
   return options_.restore.empty() || options_.restore[i] < 1;
 }
 
+bool SmoothingFlow::differs(const State& other) const {
+  const double negligible = 1e-9 * boundingBoxDiagonal(now_.curve.frames.front());
+  for (std::size_t i = 0; i < now_.curve.size(); ++i)
+    if ((other.curve.frames[i] - now_.curve.frames[i]).cwiseAbs().maxCoeff() > negligible) return true;
+  return false;
+}
+
 SmoothingFlow::Coefficients SmoothingFlow::coefficients() const {
   Coefficients result{std::vector<double>(now_.segments.size(), 1), std::vector<double>(now_.curve.size(), 0), 0};
   std::vector<double> lengths;
@@ -108,6 +116,7 @@ Solved<FlowFrame> SmoothingFlow::average(std::size_t i, double tau, const Coeffi
                           {&now_.measures[next], weights[2]},
                           {&beginning_.measures[i], weights[3]}},
                          {curve.frames[i], now_.coordinates[i]});
+  if (!options_.place) return solved;
   const Vertices place = (weights[0] * curve.frames[previous] + weights[1] * curve.frames[i] +
                           weights[2] * curve.frames[next] + weights[3] * beginning_.curve.frames[i]) /
                          (weights[0] + weights[1] + weights[2] + weights[3]);
@@ -153,13 +162,14 @@ Solved<SmoothingStep> SmoothingFlow::step() {
     auto next = moved(tau, weights);
     total = {next.termination, total.iterations + next.iterations, next.residual};
     if (total.termination == Termination::kCancelled) break;
-    taken.stationary = total.converged() && next.iterations == 0;
+    const bool shapes_stay = total.converged() && next.iterations == 0;
+    taken.stationary = shapes_stay && !differs(next.solution);
     if (taken.stationary) {
       total.termination = Termination::kStalled;
       break;
     }
     const double after = total.converged() ? next.solution.functional(weights) : before;
-    if (total.converged() && (after < before - weights.noise || !options_.control)) {
+    if (total.converged() && (shapes_stay || after < before - weights.noise || !options_.control)) {
       now_ = std::move(next.solution);
       tau_ = tau;
       return {{tau, taken.halvings, pathEnergy(), before, after, false}, total};

@@ -12,6 +12,7 @@ namespace shaped {
 struct SmoothingFlowOptions {
   double tau = 0.5;     ///< largest step, in (0, 1]
   bool control = true;  ///< halve a step until the functional falls (Lemma 2); else each step is `tau` long
+  bool place = true;    ///< average the frames' positions in space too; else each one stays where its average is found
   /// Let the segments keep the ratios of their lengths (section 4) instead of becoming equal.
   bool keep_speed = false;
   /// rho_i in [0, 1] of each frame, at a step of `tau`: how strongly the frame it was at the beginning pulls; 1 holds
@@ -61,7 +62,7 @@ using FrameAverage =
 ///   with tau, so that stationary curves do not depend on the length of the steps.
 ///
 /// A frame's position in space, of which the energy knows nothing, is averaged by the same weights: the new shape is
-/// aligned rigidly to the weighted mean of their vertices.
+/// aligned rigidly to the weighted mean of their vertices. Positions go on where no shape has anything to gain.
 class SmoothingFlow {
  public:
   /// energy: whether frames are averaged by (1) or (10), and the bending weight; F is symmetric either way.
@@ -101,6 +102,8 @@ class SmoothingFlow {
   };
 
   bool free(std::size_t i) const;
+  /// Has any frame moved in space?
+  bool differs(const State& other) const;
   Coefficients coefficients() const;
   Solved<FlowFrame> average(std::size_t i, double tau, const Coefficients& coefficients) const;
   Solved<State> moved(double tau, const Coefficients& coefficients) const;
