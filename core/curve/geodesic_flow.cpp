@@ -8,6 +8,7 @@
 
 #include "core/curve/flow_tangents.h"
 #include "core/curve/reduced_solver.h"
+#include "core/geodesic/length_angle.h"
 #include "core/mesh/alignment.h"
 #include "core/numerics/error.h"
 #include "core/reduction/krylov.h"
@@ -34,22 +35,41 @@ class Travel {
   Eigen::Vector3d centre_, shift_;
 };
 
+constexpr std::size_t kRough = 5;  ///< frames of a geodesic whose tangents enrich the subspace
+
+/// Shapes whose lengths and angles are blends of the ends', between them. Empty when one cannot be built.
+std::vector<Vertices> blends(const TopologyPtr& topology, const Vertices& a, const Vertices& b,
+                             const std::stop_token& stop) {
+  const LengthAngleReconstruction reconstruction(topology);
+  const auto from = measure(*topology, a), to = measure(*topology, b);
+  std::vector<Vertices> shapes;
+  for (std::size_t k = 1; k + 1 < kRough; ++k) {
+    const double share = static_cast<double>(k) / static_cast<double>(kRough - 1);
+    auto shape = reconstruction.reconstruct(blendMeasures(from, to, share), shapes.empty() ? a : shapes.back(), stop);
+    if (shape.rows() == 0) return {};
+    shapes.push_back(apply(alignRigidly(shape, a), shape));
+  }
+  return shapes;
+}
+
 class Refinement {
  public:
   Refinement(const ShellStructurePtr& structure, GhostSpace& space, double bending, const GeodesicFlowOptions& options)
       : structure_(structure), space_(space), bending_(bending), options_(options) {}
 
-  /// Coordinates of a geodesic with as many frames as wanted between the two given.
-  Solved<std::vector<Eigen::VectorXd>> run(const Eigen::VectorXd& from, const Eigen::VectorXd& to,
-                                           const ProgressSink& progress) {
-    Solved<std::vector<Eigen::VectorXd>> result({from, to}, {});
+  /// Coordinates of a geodesic with as many frames as wanted, between the ends of a rough path with no more.
+  Solved<std::vector<Eigen::VectorXd>> run(std::vector<Eigen::VectorXd> rough, const ProgressSink& progress) {
+    Solved<std::vector<Eigen::VectorXd>> result(std::move(rough), {});
     auto& path = result.solution;
     const auto wanted = static_cast<std::size_t>(options_.frames);
-    while (path.size() < wanted && result.termination != Termination::kCancelled) {
-      const auto segments = (path.size() - 1) * static_cast<std::size_t>(options_.insert + 1);
-      path = refined(path, std::min(segments, wanted - 1) + 1);
+    for (bool first = true; path.size() < wanted || (first && path.size() > 2); first = false) {
+      if (!first || path.size() == 2) {
+        const auto segments = (path.size() - 1) * static_cast<std::size_t>(options_.insert + 1);
+        path = refined(path, std::min(segments, wanted - 1) + 1);
+      }
       result += flow(path);
       if (path.size() >= std::min(kRough, wanted)) enrich(path, result);
+      if (result.termination == Termination::kCancelled) break;
       if (progress)
         progress({std::to_string(path.size()) + " frames",
                   static_cast<double>(path.size()) / static_cast<double>(wanted), result.residual});
@@ -60,8 +80,6 @@ class Refinement {
   double fullResidual() const { return full_residual_; }
 
  private:
-  static constexpr std::size_t kRough = 5;  ///< frames of a geodesic whose tangents enrich the subspace
-
   /// Adds the flow tangents of the path and lets it flow again, as often as is left to do.
   void enrich(std::vector<Eigen::VectorXd>& path, Outcome& outcome) {
     for (; enrichments_ < options_.enrichments && path.size() > 2; ++enrichments_) {
@@ -167,11 +185,19 @@ Solved<GeodesicFlow> geodesicByFlow(const ShellStructurePtr& structure, double b
   Solved<GeodesicFlow> result({Curve{{a, b}, false}, 0, 0, 0}, {});
   auto subspace = krylovSubspace(structure, bending, a, aligned, options.dimension, options.stop);
   if (!subspace.converged()) return {std::move(result.solution), subspace};
-  const Eigen::VectorXd end = subspace.solution.coordinates(aligned);
-  GhostSpace space(structure->topologyPtr(), std::move(subspace.solution), {a, aligned}, options.ghost_vertices,
-                   options.stop);
+  std::vector<Vertices> rough{a, aligned};
+  if (static_cast<std::size_t>(options.frames) >= kRough) {
+    const auto between = blends(structure->topologyPtr(), a, aligned, options.stop);
+    rough.insert(rough.begin() + 1, between.begin(), between.end());
+    for (const auto& shape : between)
+      subspace.solution.append(Eigen::Map<const Eigen::VectorXd>(shape.data(), shape.size()) -
+                               Eigen::Map<const Eigen::VectorXd>(a.data(), a.size()));
+  }
+  std::vector<Eigen::VectorXd> start;
+  for (const auto& shape : rough) start.push_back(subspace.solution.coordinates(shape));
+  GhostSpace space(structure->topologyPtr(), std::move(subspace.solution), rough, options.ghost_vertices, options.stop);
   Refinement refinement(structure, space, bending, options);
-  const auto path = refinement.run(Eigen::VectorXd::Zero(end.size()), end, progress);
+  const auto path = refinement.run(std::move(start), progress);
   if (path.termination == Termination::kCancelled) return {std::move(result.solution), path};
 
   const Travel travel(inverse(onto_a), a);

@@ -33,10 +33,11 @@ struct GeodesicFlow {
 };
 
 /// A discrete geodesic from a to b by the curve smoothing flow in a subspace ([BvTH16] sections 6 and 7): starting from
-/// the two ends, frames are inserted as averages of their neighbours and the flow runs until no frame has anything to
-/// gain, level after level. The subspace is krylovSubspace(), enriched (ours): the rough geodesic of some five frames
-/// tells by its flow tangents at full resolution where it wants to leave the subspace, and these directions are added.
-/// Shapes between turn and travel evenly from a's position to b's.
+/// few frames, more are inserted as averages of their neighbours and the flow runs until no frame has anything to gain,
+/// level after level. The subspace is krylovSubspace(), enriched (ours): by shapes whose lengths and angles are blends
+/// of the ends', which also are the first frames between them (the ends alone lead astray where limbs turn far); and by
+/// the flow tangents at full resolution of the rough geodesic of five frames, which tell where it wants to leave the
+/// subspace. Shapes between turn and travel evenly from a's position to b's.
 ///
 /// Iteration limit: a level did not become stationary in so many steps. Numerical failure: a shape is too close to
 /// degenerate. Throws InvalidInput naming "a", "b", "topology" or "options". Runs parallel loops in the current TBB

@@ -122,7 +122,7 @@ void curves() {
   const auto small = bodies1k(), horses = horse();
   for (const int frames : {8, 64}) {
     compare(report, small, 3, 20, frames);
-    compare(report, horses, 0, 40, frames);
+    compare(report, horses, 10, 20, frames);
   }
   smoothing(report);
   longGeodesic(report, coarsened(bodies(), 2000), 64, "<= 1.5 s", 1.5);
