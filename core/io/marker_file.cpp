@@ -1,5 +1,6 @@
 #include "core/io/marker_file.h"
 
+#include <algorithm>
 #include <cctype>
 
 #include "core/io/c3d.h"
@@ -34,6 +35,13 @@ MarkerTrial readNpyMarkers(const std::filesystem::path& path, std::span<const st
   return trial;
 }
 
+/// Would a text format give the label back as it is? Readers drop white space at its ends.
+bool survivesText(const std::string& label) {
+  const auto control = [](unsigned char c) { return c < 0x20 || c == 0x7f; };
+  return !label.empty() && label.front() != ' ' && label.back() != ' ' &&
+         label.find_first_of(",\"#") == std::string::npos && std::none_of(label.begin(), label.end(), control);
+}
+
 void requireWritable(const std::filesystem::path& path, const MarkerTrial& trial, bool with_labels) {
   if (trial.frames.empty() || trial.labels.empty()) throw InvalidInput(path.string(), "no markers to write");
   for (std::size_t f = 0; f < trial.frames.size(); ++f)
@@ -42,7 +50,7 @@ void requireWritable(const std::filesystem::path& path, const MarkerTrial& trial
           "frames[" + std::to_string(f) + "]",
           "has " + std::to_string(trial.frames[f].rows()) + " markers, want " + std::to_string(trial.labels.size()));
   for (const auto& label : trial.labels)
-    if (with_labels && (label.empty() || label.find_first_of(",\t\r\n\"#") != std::string::npos))
+    if (with_labels && !survivesText(label))
       throw InvalidInput(path.string(), "cannot hold the label " + quotedWord(label));
 }
 

@@ -16,7 +16,8 @@ MarkerTrial readMarkers(const std::filesystem::path& path, std::span<const std::
 
 /// Writes .trc (millimetres), .csv (metres) or .npy (floats, metres, no labels and no rate); the file appears only when
 /// complete. Throws InvalidInput for another extension, for no frames or markers, for a frame of another size and for a
-/// label that the format cannot hold (empty, with a tab, comma, quote or line end); FileError when writing fails.
+/// label that the format cannot hold (empty, with a comma, quote, # or control character, or with a blank at an end);
+/// FileError when writing fails.
 void writeMarkers(const std::filesystem::path& path, const MarkerTrial& trial);
 
 /// Motion capture mostly has z up; models have y up: (x, y, z) -> (x, z, -y) in every frame.

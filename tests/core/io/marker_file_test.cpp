@@ -67,6 +67,12 @@ TEST_CASE("markers that a file could not hold are not written") {
   trial.labels[1] = "a,b";
   CHECK_THROWS_WITH(writeMarkers(folder / "a.csv", trial), Contains("a.csv: cannot hold the label 'a,b'"));
   trial = smallTrial();
+  for (const char* label : {"", "a\tb", "a\n", "\fa", "a\x7f", " a", "a ", "#a", "a\"b"}) {
+    trial.labels[0] = label;
+    for (const char* name : {"a.csv", "a.trc"})
+      CHECK_THROWS_WITH(writeMarkers(folder / name, trial), Contains("cannot hold the label"));
+  }
+  trial = smallTrial();
   trial.frames[1] = Vertices::Zero(3, 3);
   CHECK_THROWS_WITH(writeMarkers(folder / "a.csv", trial), Contains("frames[1]: has 3 markers, want 2"));
   CHECK_THROWS_WITH(writeMarkers(folder / "a.csv", {}), Contains("a.csv: no markers to write"));
