@@ -62,14 +62,11 @@ class Refinement {
     Solved<std::vector<Eigen::VectorXd>> result(std::move(rough), {});
     auto& path = result.solution;
     const auto wanted = static_cast<std::size_t>(options_.frames);
-    for (bool first = true; path.size() < wanted || (first && path.size() > 2); first = false) {
-      if (!first || path.size() == 2) {
-        const auto segments = (path.size() - 1) * static_cast<std::size_t>(options_.insert + 1);
-        path = refined(path, std::min(segments, wanted - 1) + 1);
-      }
-      result += flow(path);
-      if (path.size() >= std::min(kRough, wanted)) enrich(path, result);
-      if (result.termination == Termination::kCancelled) break;
+    if (path.size() > 2) settle(path, result);
+    while (path.size() < wanted && result.termination != Termination::kCancelled) {
+      const auto segments = (path.size() - 1) * static_cast<std::size_t>(options_.insert + 1);
+      path = refined(path, std::min(segments, wanted - 1) + 1);
+      settle(path, result);
       if (progress)
         progress({std::to_string(path.size()) + " frames",
                   static_cast<double>(path.size()) / static_cast<double>(wanted), result.residual});
@@ -80,6 +77,11 @@ class Refinement {
   double fullResidual() const { return full_residual_; }
 
  private:
+  void settle(std::vector<Eigen::VectorXd>& path, Outcome& outcome) {
+    outcome += flow(path);
+    if (path.size() >= std::min(kRough, static_cast<std::size_t>(options_.frames))) enrich(path, outcome);
+  }
+
   /// Adds the flow tangents of the path and lets it flow again, as often as is left to do.
   void enrich(std::vector<Eigen::VectorXd>& path, Outcome& outcome) {
     for (; enrichments_ < options_.enrichments && path.size() > 2; ++enrichments_) {

@@ -1,7 +1,6 @@
 #include "core/curve/reduced_solver.h"
 
 #include <Eigen/Dense>
-#include <algorithm>
 
 #include "core/numerics/bfgs.h"
 
@@ -15,9 +14,7 @@ Solved<Eigen::VectorXd> ReducedSolver::average(const std::vector<AverageTerm>& t
     inverse_ = (hessian + 1e-10 * hessian.trace() * one).llt().solve(one);
   }
   if (stop_.stop_requested()) return {start, {Termination::kCancelled, 0, 0}};
-  Eigen::VectorXd gradient;
-  const double reference = std::max(function(start, gradient), function.noise());
-  return minimiseBfgs(std::ref(function), start, inverse_, {60, tolerance_, reference, function.noise(), stop_});
+  return minimiseBfgs(std::ref(function), start, inverse_, {60, tolerance_, 0, function.noise(), stop_});
 }
 
 }  // namespace shaped

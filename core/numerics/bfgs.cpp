@@ -6,6 +6,8 @@
 namespace shaped {
 namespace {
 
+constexpr double kLeast = 1e-300;  ///< reference value
+
 /// B after a step and the change of the gradient over it, (6.17); as it was where the curvature along the step is not
 /// clearly positive.
 void update(Eigen::MatrixXd& inverse, const Eigen::VectorXd& step, const Eigen::VectorXd& change) {
@@ -22,13 +24,14 @@ Solved<Eigen::VectorXd> minimiseBfgs(const DifferentiableFunction& function, con
                                      Eigen::MatrixXd& inverse_hessian, const BfgsOptions& options) {
   Eigen::VectorXd x = start, gradient(start.size()), next_gradient(start.size());
   double value = function(x, gradient);
+  const double reference = options.reference > 0 ? options.reference : std::max({value, options.noise, kLeast});
   Outcome outcome;
   for (outcome.iterations = 0;; ++outcome.iterations) {
     outcome.termination = Termination::kNumericalFailure;
     if (!std::isfinite(value) || !gradient.allFinite()) return {start, outcome};
     const Eigen::VectorXd direction = -inverse_hessian * gradient;
     const double slope = direction.dot(gradient);
-    outcome.residual = std::sqrt(std::max(-slope, 0.0) / options.reference);
+    outcome.residual = std::sqrt(std::max(-slope, 0.0) / reference);
     outcome.termination = Termination::kConverged;
     if (outcome.residual <= options.tolerance) break;
     outcome.termination = Termination::kIterationLimit;

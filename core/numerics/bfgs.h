@@ -14,7 +14,7 @@ using DifferentiableFunction = std::function<double(const Eigen::VectorXd&, Eige
 struct BfgsOptions {
   int max_iterations = 100;  ///< >= 1
   double tolerance = 1e-4;   ///< of sqrt(g^T B g / reference), > 0: of the gain that is left
-  double reference = 1;      ///< a value that the function takes, > 0
+  double reference = 0;      ///< a value that the function takes, > 0; 0: the one at the start
   double noise = 0;          ///< rounding error of the values
   std::stop_token stop = {};
 };

@@ -9,7 +9,7 @@
 namespace shaped {
 namespace {
 
-constexpr double kNegligible = 1e-9;
+constexpr double kNegligible = 1e-9;  ///< of a direction
 
 Eigen::Map<const Eigen::VectorXd> flat(const Vertices& shape) { return {shape.data(), shape.size()}; }
 
@@ -28,7 +28,7 @@ Eigen::VectorXd ShapeSubspace::coordinates(const Vertices& shape) const {
 bool ShapeSubspace::append(const Eigen::VectorXd& direction) {
   Eigen::VectorXd rest = direction.normalized();
   for (int pass = 0; pass < 2; ++pass) rest -= basis * (basis.transpose() * rest);
-  if (!(rest.norm() > 1e-7)) return false;
+  if (!(rest.norm() > kNegligible)) return false;
   basis.conservativeResize(Eigen::NoChange, basis.cols() + 1);
   basis.rightCols<1>() = rest.normalized();
   return true;
@@ -51,32 +51,20 @@ ShapeSubspace principalSubspace(const Vertices& origin, const std::vector<Vertic
   Eigen::MatrixXd displacements(origin.size(), static_cast<Eigen::Index>(shapes.size()));
   for (std::size_t i = 0; i < shapes.size(); ++i)
     displacements.col(static_cast<Eigen::Index>(i)) = flat(shapes[i]) - flat(origin);
-  // There are far fewer shapes than coordinates: right singular vectors first. They have half the digits, so the basis
-  // is orthogonalised once more.
+  // There are far fewer shapes than coordinates: right singular vectors first. They have half the digits, but
+  // what is appended is orthogonalised.
   const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> gram(displacements.transpose() * displacements);
   const Eigen::VectorXd squares = gram.eigenvalues().reverse().cwiseMax(0);
   ShapeSubspace result{origin, Eigen::MatrixXd(origin.size(), 0)};
   const auto wanted = std::min<Eigen::Index>(dimension, squares.size());
-  for (Eigen::Index j = 0; j < wanted && squares[j] > kNegligible * kNegligible * squares[0]; ++j) {
-    Eigen::VectorXd direction = displacements * gram.eigenvectors().col(squares.size() - 1 - j);
-    for (int pass = 0; pass < 2; ++pass) {
-      direction -= result.basis * (result.basis.transpose() * direction);
-      direction.normalize();
-    }
-    result.basis.conservativeResize(Eigen::NoChange, j + 1);
-    result.basis.col(j) = direction;
-  }
+  for (Eigen::Index j = 0; j < wanted && squares[j] > kNegligible * kNegligible * squares[0]; ++j)
+    result.append(displacements * gram.eigenvectors().col(squares.size() - 1 - j));
   return result;
 }
 
 ShapeSubspace including(const ShapeSubspace& subspace, const Vertices& shape) {
-  const Eigen::VectorXd displacement = flat(shape) - flat(subspace.origin);
-  Eigen::VectorXd missing = displacement;
-  for (int pass = 0; pass < 2; ++pass) missing -= subspace.basis * (subspace.basis.transpose() * missing);
   ShapeSubspace result = subspace;
-  if (!(missing.norm() > kNegligible * displacement.norm())) return result;
-  result.basis.conservativeResize(Eigen::NoChange, subspace.dimension() + 1);
-  result.basis.rightCols<1>() = missing.normalized();
+  result.append(flat(shape) - flat(subspace.origin));
   return result;
 }
 

@@ -16,7 +16,7 @@ struct ShapeSubspace {
   Vertices shape(const Eigen::VectorXd& coordinates) const;
   /// Of the shape's point nearest in the space.
   Eigen::VectorXd coordinates(const Vertices& shape) const;
-  /// Adds what is new in a direction (3V); false when that is less than 1e-7 of it, and nothing was added.
+  /// Adds what is new in a direction (3V); false when that is less than 1e-9 of it, and nothing was added.
   bool append(const Eigen::VectorXd& direction);
 };
 

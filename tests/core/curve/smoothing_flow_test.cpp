@@ -6,6 +6,7 @@
 #include <numeric>
 
 #include "tests/support/calculus.h"
+#include "tests/support/finite_differences.h"
 
 using namespace shaped;
 using namespace shaped::test;
@@ -86,6 +87,26 @@ TEST_CASE("the path energy falls in every step of the flow, and the ends of an o
       CHECK(flow.curve().frames.front() == curve.frames.front());
       CHECK(flow.curve().frames.back() == curve.frames.back());
     }
+}
+
+TEST_CASE("gradient norms are those of the path energy's differences in each frame") {
+  for (const bool closed : {false, true}) {
+    auto curve = noisyCurve(4, closed, 0.02);
+    const auto& topology = *pipe().topology;
+    const auto norms = gradientNorms(topology, symmetric().bending(), curve, measuresOf(topology, curve));
+    for (std::size_t i = 0; i < 4; ++i) {
+      if (!closed && (i == 0 || i == 3)) {
+        CHECK(norms[i] == 0);
+        continue;
+      }
+      const auto energy = [&, other = curve](const Vertices& frame) mutable {
+        other.frames[i] = frame;
+        const auto all = segmentEnergies(topology, symmetric().bending(), other, measuresOf(topology, other));
+        return std::accumulate(all.begin(), all.end(), 0.0);
+      };
+      CHECK(norms[i] == Approx(differenceGradient(energy, curve.frames[i], 1e-4).norm()).epsilon(1e-6));
+    }
+  }
 }
 
 TEST_CASE("an open curve flows to the discrete geodesic between its ends") {

@@ -20,7 +20,7 @@ double valley(const Eigen::VectorXd& x, Eigen::VectorXd& gradient) {
 
 TEST_CASE("the BFGS method finds the end of a curved valley and learns the inverse Hessian there") {
   Eigen::MatrixXd inverse = Eigen::MatrixXd::Identity(2, 2);
-  const auto solved = minimiseBfgs(valley, Eigen::Vector2d(-1.2, 1), inverse, {.tolerance = 1e-9});
+  const auto solved = minimiseBfgs(valley, Eigen::Vector2d(-1.2, 1), inverse, {.tolerance = 1e-9, .reference = 1});
   REQUIRE(solved.converged());
   CHECK((solved.solution - Eigen::Vector2d(1, 1)).norm() < 1e-8);
   CHECK(solved.residual <= 1e-9);
@@ -28,7 +28,7 @@ TEST_CASE("the BFGS method finds the end of a curved valley and learns the inver
   hessian << 802, -400, -400, 200;
   CHECK((inverse * hessian - Eigen::Matrix2d::Identity()).norm() < 0.05);
   // what was learnt makes the next start a short one
-  const auto again = minimiseBfgs(valley, Eigen::Vector2d(1.001, 1.002), inverse, {.tolerance = 1e-9});
+  const auto again = minimiseBfgs(valley, Eigen::Vector2d(1.001, 1.002), inverse, {.tolerance = 1e-9, .reference = 1});
   CHECK(again.converged());
   CHECK(again.iterations < solved.iterations / 3);
 }
@@ -42,7 +42,7 @@ TEST_CASE("with the exact inverse Hessian a quadratic is minimised in one step")
     return 0.5 * (x - minimum).dot(gradient);
   };
   Eigen::MatrixXd inverse = hessian.inverse();
-  const auto solved = minimiseBfgs(quadratic, Eigen::VectorXd::Zero(12), inverse, {.tolerance = 1e-10});
+  const auto solved = minimiseBfgs(quadratic, Eigen::VectorXd::Zero(12), inverse, {.tolerance = 1e-10, .reference = 1});
   CHECK(solved.converged());
   CHECK(solved.iterations == 1);
   CHECK((solved.solution - minimum).norm() < 1e-10);
@@ -54,11 +54,11 @@ TEST_CASE("the BFGS method steps back from where a function is not defined, and 
     return x[0] > 0 ? x[0] - 0.01 * std::log(x[0]) : std::numeric_limits<double>::infinity();
   };
   Eigen::MatrixXd inverse = Eigen::MatrixXd::Constant(1, 1, 10);
-  const auto solved = minimiseBfgs(barrier, Eigen::VectorXd::Ones(1), inverse, {.tolerance = 1e-8});
+  const auto solved = minimiseBfgs(barrier, Eigen::VectorXd::Ones(1), inverse, {.tolerance = 1e-8, .reference = 1});
   CHECK(solved.converged());
   CHECK(solved.solution[0] == Approx(0.01).epsilon(1e-6));
   inverse.setConstant(0.1);
-  CHECK(minimiseBfgs(barrier, Eigen::VectorXd::Ones(1), inverse, {.max_iterations = 1}).termination ==
+  CHECK(minimiseBfgs(barrier, Eigen::VectorXd::Ones(1), inverse, {.max_iterations = 1, .reference = 1}).termination ==
         Termination::kIterationLimit);
   const auto nowhere = minimiseBfgs(barrier, -Eigen::VectorXd::Ones(1), inverse, {});
   CHECK(nowhere.termination == Termination::kNumericalFailure);
