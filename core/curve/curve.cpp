@@ -6,11 +6,6 @@
 #include "core/shell/measure_derivatives.h"
 
 namespace shaped {
-namespace {
-
-constexpr double kBothDirections = 2;  ///< PairEnergy takes the mean of them
-
-}  // namespace
 
 void requireCurve(const Topology& topology, const Curve& curve, const std::string& field) {
   const std::size_t least = curve.closed ? 3 : 2;
@@ -39,18 +34,25 @@ std::vector<double> segmentEnergies(const Topology& topology, double bending, co
   return energies;
 }
 
+Vertices curveGradient(const Topology& topology, const PairEnergy& energy, const Vertices& shape,
+                       const ShellMeasures& before, const ShellMeasures& here, const ShellMeasures& after) {
+  MeasureGradient gradient(topology);
+  energy.addSecondGradient(topology, before, here, kBothDirections, gradient);
+  energy.addFirstGradient(topology, here, after, kBothDirections, gradient);
+  Vertices force = Vertices::Zero(shape.rows(), 3);
+  pullBackGradient(topology, shape, gradient, force);
+  return force;
+}
+
 std::vector<double> gradientNorms(const Topology& topology, double bending, const Curve& curve,
                                   const std::vector<ShellMeasures>& measures) {
   const PairEnergy energy(bending, EnergySymmetry::kSymmetric);
   std::vector<double> norms(curve.size(), 0);
   tbb::parallel_for(std::size_t{0}, curve.size(), [&](std::size_t i) {
     if (!curve.closed && (i == 0 || i + 1 == curve.size())) return;
-    MeasureGradient gradient(topology);
-    energy.addSecondGradient(topology, measures[curve.previous(i)], measures[i], kBothDirections, gradient);
-    energy.addFirstGradient(topology, measures[i], measures[curve.next(i)], kBothDirections, gradient);
-    Vertices force = Vertices::Zero(curve.frames[i].rows(), 3);
-    pullBackGradient(topology, curve.frames[i], gradient, force);
-    norms[i] = force.norm();
+    norms[i] = curveGradient(topology, energy, curve.frames[i], measures[curve.previous(i)], measures[i],
+                             measures[curve.next(i)])
+                   .norm();
   });
   return norms;
 }

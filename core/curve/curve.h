@@ -32,6 +32,14 @@ std::vector<ShellMeasures> measuresOf(const Topology& topology, const Curve& cur
 std::vector<double> segmentEnergies(const Topology& topology, double bending, const Curve& curve,
                                     const std::vector<ShellMeasures>& measures);
 
+/// E[a, b] = W[a, b] + W[b, a] is so many times what PairEnergy has, which is the mean of both directions.
+inline constexpr double kBothDirections = 2;
+
+/// The part of the gradient of (4) that belongs to a frame between two others, at `shape`, V x 3 [m]. energy:
+/// symmetric.
+Vertices curveGradient(const Topology& topology, const PairEnergy& energy, const Vertices& shape,
+                       const ShellMeasures& before, const ShellMeasures& here, const ShellMeasures& after);
+
 /// The norm of each frame's part of the gradient of (4), the left-hand side of (3) [m]; 0 at the ends of an open curve.
 /// Large where the motion has a corner.
 std::vector<double> gradientNorms(const Topology& topology, double bending, const Curve& curve,

@@ -50,6 +50,22 @@ Tangent tangentOf(const ShellStructure& structure, const PairEnergy& energy, con
   return result;
 }
 
+/// The solution of y_i - (y_i-1 + y_i+1) / 2 = directions_i between fixed ends (Thomas' algorithm).
+std::vector<Eigen::VectorXd> spread(const std::vector<Eigen::VectorXd>& directions) {
+  const std::size_t last = directions.size() - 2;
+  std::vector<double> factor(directions.size(), 0);
+  auto result = directions;
+  for (std::size_t i = 1; i <= last; ++i) {
+    if (result[i].size() == 0) return {};
+    const double pivot = 1 - 0.5 * factor[i - 1];
+    factor[i] = 0.5 / pivot;
+    if (i > 1) result[i] += 0.5 * result[i - 1];
+    result[i] /= pivot;
+  }
+  for (std::size_t i = last; i > 1; --i) result[i - 1] += factor[i - 1] * result[i];
+  return result;
+}
+
 }  // namespace
 
 FlowTangents flowTangents(const ShellStructurePtr& structure, double bending, const Curve& curve,
@@ -59,12 +75,14 @@ FlowTangents flowTangents(const ShellStructurePtr& structure, double bending, co
   FlowTangents result;
   result.directions.resize(curve.size());
   std::vector<double> imbalances(curve.size(), 0);
-  tbb::parallel_for(std::size_t{1}, curve.size() - 1, [&](std::size_t i) {
-    if (stop.stop_requested()) return;
-    auto tangent = tangentOf(*structure, energy, curve.frames[i], measures[i - 1], measures[i], measures[i + 1], stop);
+  tbb::parallel_for(std::size_t{0}, curve.size(), [&](std::size_t i) {
+    if (stop.stop_requested() || (!curve.closed && (i == 0 || i + 1 == curve.size()))) return;
+    auto tangent = tangentOf(*structure, energy, curve.frames[i], measures[curve.previous(i)], measures[i],
+                             measures[curve.next(i)], stop);
     result.directions[i] = std::move(tangent.direction);
     imbalances[i] = tangent.imbalance;
   });
+  if (curve.size() > 2 && !curve.closed) result.displacements = spread(result.directions);
   result.residual = *std::max_element(imbalances.begin(), imbalances.end());
   return result;
 }

@@ -6,11 +6,15 @@
 
 namespace shaped {
 
-/// Which way each inner frame of an open curve would go to lower the path energy (4): Newton's direction of its own
-/// coordinates at full resolution, without its rigid part; [BvTH16] (9) with the Hessian where the frame is instead of
-/// where its neighbours would be on it.
+/// Which way each frame of a curve, but the ends of an open one, would go to lower the path energy (4): Newton's
+/// direction of its own coordinates at full resolution, without its rigid part; [BvTH16] (9) with the Hessian where the
+/// frame is instead of where its neighbours would be on it.
 struct FlowTangents {
   std::vector<Eigen::VectorXd> directions;  ///< 3V each; empty at the ends and where there is none
+  /// Where the inner frames would be after a step of Newton's method for all of them, if the Hessian were the same
+  /// along the curve: y_i - (y_i-1 + y_i+1) / 2 = directions_i. Empty for a closed curve and when a direction is
+  /// missing.
+  std::vector<Eigen::VectorXd> displacements;
   /// The largest over the frames of |gradient| / (|force towards the one before| + |towards the next|): 0 for a
   /// geodesic.
   double residual = 0;

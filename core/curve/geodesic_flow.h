@@ -1,9 +1,10 @@
 #pragma once
 
 #include <optional>
-#include "core/curve/curve.h"
-#include "core/numerics/progress.h"
 
+#include "core/curve/curve.h"
+#include "core/curve/reduced_path.h"
+#include "core/numerics/progress.h"
 #include "core/numerics/solved.h"
 
 namespace shaped {
@@ -12,12 +13,14 @@ struct GeodesicFlowOptions {
   int frames = 64;                     ///< of the geodesic with both ends, >= 2
   int insert = 3;                      ///< frames between two at each temporal refinement, >= 1
   int dimension = 14;                  ///< of the Krylov subspace to begin with, >= 1
-  int enrichments = 2;                 ///< of the subspace by the flow tangents of a rough geodesic, >= 0
+  int rough = 5;                       ///< frames of the rough geodesic by which the subspace is enriched, >= 3
+  int enrichments = 2;                 ///< of the subspace at most, >= 0
+  double accuracy = 1e-5;              ///< > 0; no more enrichments once GeodesicFlow::missing is below
   std::int32_t ghost_vertices = 1250;  ///< of the mesh on which energies are evaluated, >= 4
-  EnergySymmetry symmetry = EnergySymmetry::kSymmetric;  ///< of the averages: (1), or (10) at half the cost
-  /// When a frame is where it belongs: sqrt(gain / energy of its two segments), > 0.
-  double tolerance = 1e-4;
-  int steps = 500;  ///< of the flow at most, on each level, >= 1
+  EnergySymmetry symmetry = EnergySymmetry::kSymmetric;  ///< of the flow's averages: (1), or (10) at half the cost
+  PathSolver solver = PathSolver::kNewton;
+  double tolerance = 1e-4;  ///< as ReducedPathOptions::tolerance
+  int steps = 500;          ///< of the solver at most, on each level, >= 1
   std::stop_token stop = {};
 
   /// "frames = 1, want >= 2"; empty when all is well.
@@ -28,8 +31,9 @@ struct GeodesicFlow {
   Curve curve;                 ///< its ends are a and b themselves
   double path_energy = 0;      ///< (4) on the ghost mesh [m^2]
   Eigen::Index dimension = 0;  ///< of the subspace in the end
-  /// Of the rough geodesic at full resolution before the last enrichment, as FlowTangents::residual; 0 without one.
-  double full_residual = 0;
+  /// Of the rough geodesic at full resolution before the last enrichment, as FlowTangents::residual and
+  /// PathEnrichment::missing; 0 without one.
+  double full_residual = 0, missing = 0;
 };
 
 /// A discrete geodesic from a to b by the curve smoothing flow in a subspace ([BvTH16] sections 6 and 7): starting from

@@ -4,12 +4,14 @@
 
 #include <algorithm>
 
+#include "core/curve/flow_tangents.h"
 #include "core/mesh/alignment.h"
 #include "core/numerics/error.h"
 
 namespace shaped {
 namespace {
 
+constexpr std::size_t kCoarse = 20;      ///< frames: curves with fewer bring their flow tangents along
 constexpr std::size_t kGhostShapes = 8;  ///< that the ghost mesh is made for, spread over the curve
 
 std::vector<Vertices> ghostShapes(const Curve& curve, std::size_t central) {
@@ -35,9 +37,15 @@ ReducedCurve::ReducedCurve(const TopologyPtr& topology, double bending, const Cu
   tbb::parallel_for(std::size_t{0}, curve.size(), [&](std::size_t i) {
     aligned[i] = apply(alignRigidly(curve.frames[i], curve.frames[central]), curve.frames[i]);
   });
-  space_ =
-      std::make_unique<const GhostSpace>(topology, principalSubspace(curve.frames[central], aligned, options.dimension),
-                                         ghostShapes(curve, central), options.ghost_vertices, options.stop);
+  auto subspace = principalSubspace(curve.frames[central], aligned, options.dimension);
+  if (curve.size() < kCoarse) {
+    // So few frames span too little of where they would go.
+    const auto structure = std::make_shared<const ShellStructure>(topology);
+    for (const auto& direction : flowTangents(structure, bending, {aligned, curve.closed}, options.stop).directions)
+      if (direction.size() > 0) subspace.append(direction);
+  }
+  space_ = std::make_unique<const GhostSpace>(topology, std::move(subspace), ghostShapes(curve, central),
+                                              options.ghost_vertices, options.stop);
   tbb::parallel_for(std::size_t{0}, curve.size(), [&](std::size_t i) { frames_[i] = frameOf(aligned[i]); });
   beginning_.closed = curve.closed;
   for (const auto& frame : curve.frames) beginning_.frames.push_back(space_->restrict(frame));

@@ -7,7 +7,7 @@
 namespace shaped {
 
 struct ReducedCurveOptions {
-  int dimension = 15;                  ///< of the subspace that all frames share, >= 1
+  int dimension = 15;                  ///< of the principal directions that all frames share, >= 1
   std::int32_t ghost_vertices = 1250;  ///< of the mesh on which energies are evaluated, >= 4; no more than there are
   EnergySymmetry symmetry = EnergySymmetry::kDirected;  ///< of the averages: (10), or (1) at twice the cost
   double tolerance = 1e-4;  ///< of a frame's solve: sqrt(gain left / energy of its terms), > 0
@@ -18,8 +18,9 @@ struct ReducedCurveOptions {
 /// [BvTH16] section 6. What a step of the flow costs does not depend on the number of vertices.
 ///
 /// Frame i, moved rigidly onto the origin, is origin + U q + s n_i: U holds the principal directions of all frames, n_i
-/// what these miss of the frame. The ghost mesh keeps some of the vertices, and so do origin and directions. The
-/// averages are minimised by the BFGS method from an inverse Hessian that is computed once for each frame.
+/// what these miss of the frame. A curve of fewer than 20 frames adds its flow tangents (9) to U. The ghost mesh keeps
+/// some of the vertices, and so do origin and directions. The averages are minimised by the BFGS method from an inverse
+/// Hessian that is computed once for each frame.
 class ReducedCurve {
  public:
   /// Throws as requireCurve. Runs parallel loops in the current TBB arena.

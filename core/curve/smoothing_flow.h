@@ -79,6 +79,8 @@ class SmoothingFlow {
   Solved<SmoothingStep> step();
 
   const Curve& curve() const { return now_.curve; }
+  /// May the frame move?
+  bool free(std::size_t i) const;
   FlowFrame frame(std::size_t i) const { return {now_.curve.frames[i], now_.coordinates[i]}; }
   double pathEnergy() const;  ///< (4) [m^2]
   /// As gradientNorms() of the curve as it stands.
@@ -101,7 +103,6 @@ class SmoothingFlow {
     double functional(const Coefficients& coefficients) const;
   };
 
-  bool free(std::size_t i) const;
   /// Has any frame moved in space?
   bool differs(const State& other) const;
   Coefficients coefficients() const;

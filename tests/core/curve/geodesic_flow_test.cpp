@@ -78,6 +78,19 @@ TEST_CASE("the frames of a geodesic by flow travel evenly from the first positio
   }
 }
 
+TEST_CASE("the frames of a geodesic by flow go from one position to the next without a jump") {
+  const Fixture f;
+  const auto flow = f.flow({.frames = 33, .enrichments = 4});
+  REQUIRE(flow.converged());
+  const auto& frames = flow.solution.curve.frames;
+  const double way = (f.b - f.a).norm();
+  std::vector<double> steps;
+  for (std::size_t i = 0; i + 1 < frames.size(); ++i) steps.push_back((frames[i + 1] - frames[i]).norm());
+  const auto [least, most] = std::minmax_element(steps.begin(), steps.end());
+  CHECK(*most < 0.1 * way);
+  CHECK(*most < 1.7 * *least);
+}
+
 TEST_CASE("a geodesic by flow says how it ended and refuses bad input by name") {
   Fixture f;
   CHECK(f.flow({.frames = 30, .ghost_vertices = 80, .tolerance = 1e-9, .steps = 1}).termination ==

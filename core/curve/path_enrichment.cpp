@@ -1,0 +1,58 @@
+#include "core/curve/path_enrichment.h"
+
+#include <Eigen/Eigenvalues>
+#include <algorithm>
+#include <cmath>
+
+#include "core/curve/flow_tangents.h"
+
+namespace shaped {
+namespace {
+
+constexpr double kNegligible = 1e-3;  ///< of the largest displacement
+
+/// The columns' principal directions, the longest first, down to negligible ones.
+std::vector<Eigen::VectorXd> principalDirections(const std::vector<Eigen::VectorXd>& vectors, int most) {
+  Eigen::MatrixXd columns(vectors.front().size(), static_cast<Eigen::Index>(vectors.size()));
+  for (std::size_t i = 0; i < vectors.size(); ++i) columns.col(static_cast<Eigen::Index>(i)) = vectors[i];
+  const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> gram(columns.transpose() * columns);
+  std::vector<Eigen::VectorXd> directions;
+  for (Eigen::Index j = columns.cols(); j-- > 0 && static_cast<int>(directions.size()) < most;) {
+    if (!(gram.eigenvalues()[j] > kNegligible * kNegligible * gram.eigenvalues()[columns.cols() - 1])) break;
+    directions.emplace_back(columns * gram.eigenvectors().col(j));
+  }
+  return directions;
+}
+
+}  // namespace
+
+PathEnrichment enrich(const ShellStructurePtr& structure, double bending, GhostSpace& space,
+                      const std::vector<PathCoordinates>& paths, double tolerance, int most,
+                      const std::stop_token& stop) {
+  PathEnrichment result;
+  std::vector<Eigen::VectorXd> displacements;
+  double displaced = 0, size = 0;
+  for (const auto& path : paths) {
+    Curve curve{{}, false};
+    for (const auto& coordinates : path) {
+      curve.frames.push_back(space.fine().shape(coordinates));
+      const auto& shape = curve.frames.back();
+      size += (shape.rowwise() - shape.colwise().mean()).squaredNorm();
+    }
+    const auto tangents = flowTangents(structure, bending, curve, stop);
+    if (stop.stop_requested()) return result;
+    result.residual = std::max(result.residual, tangents.residual);
+    for (const auto& displacement : tangents.displacements) {
+      if (displacement.size() == 0) continue;
+      displaced += displacement.squaredNorm();
+      displacements.push_back(displacement);
+    }
+  }
+  result.missing = std::sqrt(displaced / size);
+  if (displacements.empty() || result.missing <= tolerance) return result;
+  for (const auto& direction : principalDirections(displacements, most))
+    if (space.append(direction)) ++result.added;
+  return result;
+}
+
+}  // namespace shaped
