@@ -32,6 +32,7 @@ struct Placed {
   Vertices vertices;
   Camera camera;
   PlaneBox box;
+  double floor;  ///< y of the ground
 };
 
 struct Layout {
@@ -75,10 +76,35 @@ Placed place(const RenderItem& item, double radius, const RenderOptions& options
   const Camera camera =
       orbitCamera(centre.transpose(), 6 * radius, options.azimuth * radian, options.elevation * radian);
   const PlaneBox box = coveredBox(camera, vertices);
-  return {&item, std::move(vertices), camera, box};
+  const double floor = vertices.col(1).minCoeff();
+  return {&item, std::move(vertices), camera, box, floor};
+}
+
+/// All of them seen as their union is.
+std::vector<Placed> placeTogether(const std::vector<RenderItem>& items, const RenderOptions& options) {
+  Eigen::RowVector3d low = items.front().vertices.row(0), high = low;
+  for (const auto& item : items) {
+    low = low.cwiseMin(item.vertices.colwise().minCoeff());
+    high = high.cwiseMax(item.vertices.colwise().maxCoeff());
+  }
+  Vertices corners(2, 3);
+  corners << low, high;
+  const RenderItem whole{corners, {}, {}, {}};
+  const auto view = place(whole, halfDiagonal(corners), options);
+  std::vector<Placed> placed;
+  PlaneBox box = coveredBox(view.camera, withYUp(items.front().vertices, options.up));
+  for (const auto& item : items) {
+    Vertices vertices = withYUp(item.vertices, options.up);
+    const auto covered = coveredBox(view.camera, vertices);
+    placed.push_back({&item, std::move(vertices), view.camera, covered, view.floor});
+    box = {box.low.cwiseMin(covered.low), box.high.cwiseMax(covered.high)};
+  }
+  for (auto& p : placed) p.box = box;
+  return placed;
 }
 
 std::vector<Placed> place(const std::vector<RenderItem>& items, const RenderOptions& options) {
+  if (options.common_view) return placeTogether(items, options);
   double radius = 0;
   for (const auto& item : items) radius = std::max(radius, halfDiagonal(item.vertices));
   std::vector<Placed> placed;
@@ -98,6 +124,12 @@ int chosenColumns(int count, const Layout& layout) {
     if (cost < least) least = cost, best = columns;
   }
   return best;
+}
+
+void requireItems(const std::vector<RenderItem>& items, const RenderOptions& options) {
+  if (const auto problem = options.firstViolation()) throw InvalidInput("options", *problem);
+  if (items.empty()) throw InvalidInput("items", "there is no mesh to draw");
+  for (std::size_t i = 0; i < items.size(); ++i) requireItem(items[i], i);
 }
 
 Layout layOut(const std::vector<Placed>& placed, const RenderOptions& options) {
@@ -153,20 +185,21 @@ Eigen::Vector3d keyDirection(const Camera& camera) {
   return (-0.75 * camera.right + 1.1 * Eigen::Vector3d::UnitY() - 0.9 * camera.forward).normalized();
 }
 
-void drawPicture(Image& image, const Placed& placed, const Layout& layout, std::size_t index,
+/// left, top: of its tile.
+void drawPicture(Image& image, int left, int top, const Placed& placed, const Layout& layout, double pixels_per_unit,
                  const RenderOptions& options, const std::stop_token& stop) {
-  const RayScene scene(placed.vertices, placed.item->faces);
+  const RayScene scene(placed.vertices, placed.item->faces, placed.floor);
   Lighting lighting{keyDirection(placed.camera)};
   lighting.ground = options.ground;
   const Shader shader(scene, placed.item->faces, placed.item->colors, options.color, lighting);
-  const int left = static_cast<int>(index) % layout.columns * layout.tile_width;
-  const int top = static_cast<int>(index) / layout.columns * layout.tileHeight();
   tbb::parallel_for(0, layout.picture_height, [&](int y) {
     if (stop.stop_requested()) return;
     for (int x = 0; x < layout.tile_width; ++x)
-      image.blend(left + x, top + y,
-                  pixelColor(shader, placed, layout, layout.pixels_per_unit[index], options.samples, x, y));
+      image.blend(left + x, top + y, pixelColor(shader, placed, layout, pixels_per_unit, options.samples, x, y));
   });
+}
+
+void drawCaption(Image& image, int left, int top, const Placed& placed, const Layout& layout) {
   const std::string caption = fittedText(placed.item->caption, (layout.tile_width - 2 * kPadding) / kCaptionDot);
   const int caption_left = left + (layout.tile_width - textWidth(caption) * kCaptionDot) / 2;
   drawText(image, caption_left, top + layout.picture_height, caption, kCaptionDot, kInk);
@@ -206,16 +239,31 @@ std::optional<std::string> RenderOptions::firstViolation() const {
 }
 
 Image renderContactSheet(const std::vector<RenderItem>& items, const RenderOptions& options, std::stop_token stop) {
-  if (const auto problem = options.firstViolation()) throw InvalidInput("options", *problem);
-  if (items.empty()) throw InvalidInput("items", "a contact sheet needs at least one mesh");
-  for (std::size_t i = 0; i < items.size(); ++i) requireItem(items[i], i);
+  requireItems(items, options);
   const auto placed = place(items, options);
   const Layout layout = layOut(placed, options);
   Image image(layout.width(), layout.height());
-  for (std::size_t i = 0; i < placed.size() && !stop.stop_requested(); ++i)
-    drawPicture(image, placed[i], layout, i, options, stop);
+  for (std::size_t i = 0; i < placed.size() && !stop.stop_requested(); ++i) {
+    const int left = static_cast<int>(i) % layout.columns * layout.tile_width;
+    const int top = static_cast<int>(i) / layout.columns * layout.tileHeight();
+    drawPicture(image, left, top, placed[i], layout, layout.pixels_per_unit[i], options, stop);
+    drawCaption(image, left, top, placed[i], layout);
+  }
   if (options.legend) drawLegend(image, layout.rows * layout.tileHeight() + kPadding, *options.legend);
   return image;
+}
+
+std::vector<Image> renderSeparately(const std::vector<RenderItem>& items, const RenderOptions& options,
+                                    std::stop_token stop) {
+  requireItems(items, options);
+  const auto placed = place(items, options);
+  const Layout layout = layOut(placed, options);
+  std::vector<Image> images;
+  for (std::size_t i = 0; i < placed.size() && !stop.stop_requested(); ++i) {
+    images.emplace_back(layout.tile_width, layout.picture_height);
+    drawPicture(images.back(), 0, 0, placed[i], layout, layout.pixels_per_unit[i], options, stop);
+  }
+  return images;
 }
 
 }  // namespace shaped

@@ -34,8 +34,11 @@ struct RenderOptions {
   double elevation = 18;     ///< degrees above the horizon, -85 to 85
   UpAxis up = UpAxis::kY;    ///< which axis of the meshes points up
   bool common_scale = true;  ///< all meshes at one scale; otherwise each fills its tile
-  bool ground = true;        ///< a soft shadow below each mesh
-  int samples = 3;           ///< per pixel and axis, 1 to 8
+  /// All meshes are seen from one place, where they are in space: frames of a motion. Otherwise each in its tile's
+  /// middle.
+  bool common_view = false;
+  bool ground = true;                 ///< a soft shadow below each mesh
+  int samples = 3;                    ///< per pixel and axis, 1 to 8
   Color color{0.86f, 0.70f, 0.52f};   ///< of meshes without colours of their own
   std::optional<ColorLegend> legend;  ///< drawn below where given
 
@@ -51,5 +54,9 @@ struct RenderOptions {
 /// When the stop token fires, remaining rows stay white.
 Image renderContactSheet(const std::vector<RenderItem>& items, const RenderOptions& options = {},
                          std::stop_token stop = {});
+
+/// The same pictures one by one, all of one size, without captions and legend: frames of an animated picture.
+std::vector<Image> renderSeparately(const std::vector<RenderItem>& items, const RenderOptions& options = {},
+                                    std::stop_token stop = {});
 
 }  // namespace shaped

@@ -67,12 +67,12 @@ struct RayScene::Embree {
   Embree& operator=(const Embree&) = delete;
 };
 
-RayScene::RayScene(const Vertices& vertices, const Faces& faces)
+RayScene::RayScene(const Vertices& vertices, const Faces& faces, double floor)
     : vertices_(vertices),
       normals_(vertexNormals(faces, vertices)),
       faces_(faces),
       radius_(0.5 * (vertices.colwise().maxCoeff() - vertices.colwise().minCoeff()).norm()),
-      floor_(vertices.col(1).minCoeff()),
+      floor_(floor),
       embree_(std::make_unique<Embree>(vertices, faces)) {}
 
 RayScene::~RayScene() = default;

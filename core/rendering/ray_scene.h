@@ -22,8 +22,8 @@ struct RayHit {
 /// One mesh prepared for ray casting; const queries may run from several threads at once.
 class RayScene {
  public:
-  /// vertices: V x 3, finite; faces: F x 3, in range.
-  RayScene(const Vertices& vertices, const Faces& faces);
+  /// vertices: V x 3, finite; faces: F x 3, in range. floor: the y of the ground.
+  RayScene(const Vertices& vertices, const Faces& faces, double floor);
   ~RayScene();
   RayScene(const RayScene&) = delete;
   RayScene& operator=(const RayScene&) = delete;
@@ -36,7 +36,6 @@ class RayScene {
 
   /// Half the diagonal of the bounding box.
   double radius() const { return radius_; }
-  /// The lowest y.
   double floor() const { return floor_; }
 
  private:

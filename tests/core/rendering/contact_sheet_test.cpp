@@ -229,3 +229,35 @@ TEST_CASE("a contact sheet refuses bad input by name") {
   options.samples = 0;
   CHECK_THROWS_WITH(renderContactSheet({good}, options), Catch::Contains("samples = 0, want 1 to 8"));
 }
+
+TEST_CASE("frames that are seen from one place show where they are, and stand on one ground") {
+  auto left = sphere(), right = sphere();
+  left.vertices.col(0).array() -= 3;
+  right.vertices.col(0).array() += 3;
+  right.vertices.col(1).array() += 1;
+  RenderOptions options;
+  options.azimuth = options.elevation = 0;
+  options.ground = false;
+  options.common_view = true;
+  options.tile_width = 120;
+  const auto images = renderSeparately({left, right}, options);
+  REQUIRE(images.size() == 2);
+  CHECK(images[0].width() == images[1].width());
+  CHECK(images[0].height() == images[1].height());
+  const auto covered = [](const Image& image) {
+    Eigen::Vector2d sum = Eigen::Vector2d::Zero();
+    int count = 0;
+    for (int y = 0; y < image.height(); ++y)
+      for (int x = 0; x < image.width(); ++x)
+        if (image.at(x, y)[2] < 250) sum += Eigen::Vector2d(x, y), ++count;
+    return Eigen::Vector2d(sum / std::max(count, 1));
+  };
+  const auto a = covered(images[0]), b = covered(images[1]);
+  CHECK(a.x() < 40);
+  CHECK(b.x() > 80);
+  CHECK(b.y() < a.y());
+  options.common_view = false;
+  const auto own = renderSeparately({left, right}, options);
+  CHECK((covered(own[0]) - covered(own[1])).norm() < 1);
+  CHECK_THROWS_AS(renderSeparately({}, options), InvalidInput);
+}
