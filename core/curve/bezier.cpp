@@ -16,8 +16,6 @@
 namespace shaped {
 namespace {
 
-constexpr int kDirections = 8;     ///< that join the subspace at once, at most
-constexpr double kUseful = 0.9;    ///< of what was missing, at most, is missing after a round that is worth its time
 constexpr std::size_t kRough = 5;  ///< frames of the paths by which the subspace is enriched
 
 /// One geodesic of the construction as its ends move: the path at the latest t and at the one before.
@@ -185,6 +183,7 @@ class BezierRun {
   /// Adds to the space what a rough construction wants.
   void enrichSpace(BezierCurve& curve, Outcome& outcome) {
     settleSides(outcome);
+    PathEnrichment last;
     for (int round = 0; round < options_.geodesic.enrichments && sides_.size() > 1 && !cancelled(outcome); ++round) {
       std::vector<PathCoordinates> rough, inner;
       for (const auto& side : sides_) rough.push_back(resampled(*space_, bending_, side, kRough, settling_));
@@ -194,16 +193,15 @@ class BezierRun {
         for (auto& path : construction.innerPaths()) inner.push_back(std::move(path));
         curve.geodesics += construction.geodesics();
       }
-      const double before = curve.missing;
       const auto grown =
-          enrich(structure_, bending_, *space_, inner, options_.geodesic.accuracy, kDirections, options_.geodesic.stop);
+          enrich(structure_, bending_, *space_, inner, options_.geodesic.accuracy, options_.geodesic.stop);
       curve.missing = grown.missing;
       tell("subspace of " + std::to_string(space_->dimension()),
            kSides + (kSpace - kSides) * (round + 1) / options_.geodesic.enrichments, outcome);
-      if (grown.added == 0) return;
       for (auto& side : sides_) side = extended(side, *space_);
-      settleSides(outcome);
-      if (round > 0 && grown.missing > kUseful * before) return;
+      if (grown.added > 0) settleSides(outcome);
+      if (!grown.worthAnother(last)) return;
+      last = grown;
     }
   }
 

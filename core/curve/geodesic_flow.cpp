@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <utility>
 
 #include "core/curve/path_enrichment.h"
 #include "core/curve/travel.h"
@@ -16,8 +17,6 @@ namespace shaped {
 namespace {
 
 constexpr std::size_t kRough = 5;  ///< frames of the first path, with blends between the ends
-constexpr int kDirections = 8;     ///< that join the subspace at once, at most
-constexpr double kUseful = 0.9;    ///< of what was missing, at most, is missing after a round that is worth its time
 
 /// Shapes whose lengths and angles are blends of the ends', between them. Empty when one cannot be built.
 std::vector<Vertices> blends(const TopologyPtr& topology, const Vertices& a, const Vertices& b,
@@ -73,11 +72,11 @@ class Refinement {
     enriched_ = true;
     for (int round = 0; round < options_.enrichments; ++round) {
       if (outcome.termination == Termination::kCancelled) return;
-      const double before = last_.missing;
-      last_ = enrich(structure_, bending_, space_, {path}, options_.accuracy, kDirections, options_.stop);
-      if (last_.added == 0 || (round > 0 && last_.missing > kUseful * before)) return;
+      const auto before =
+          std::exchange(last_, enrich(structure_, bending_, space_, {path}, options_.accuracy, options_.stop));
       path = extended(path, space_);
-      outcome += shaped::settle(space_, bending_, path, settling_);
+      if (last_.added > 0) outcome += shaped::settle(space_, bending_, path, settling_);
+      if (!last_.worthAnother(before)) return;
     }
   }
 

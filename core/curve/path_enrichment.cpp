@@ -9,15 +9,17 @@
 namespace shaped {
 namespace {
 
-constexpr double kNegligible = 1e-3;  ///< of the largest displacement
+constexpr double kNegligible = 1e-3;        ///< of the largest displacement
+constexpr std::size_t kMostDirections = 8;  ///< that join at once
+constexpr double kUseful = 0.9;  ///< of what was missing, at most, is missing after a round that was worth its time
 
 /// The columns' principal directions, the longest first, down to negligible ones.
-std::vector<Eigen::VectorXd> principalDirections(const std::vector<Eigen::VectorXd>& vectors, int most) {
+std::vector<Eigen::VectorXd> principalDirections(const std::vector<Eigen::VectorXd>& vectors) {
   Eigen::MatrixXd columns(vectors.front().size(), static_cast<Eigen::Index>(vectors.size()));
   for (std::size_t i = 0; i < vectors.size(); ++i) columns.col(static_cast<Eigen::Index>(i)) = vectors[i];
   const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> gram(columns.transpose() * columns);
   std::vector<Eigen::VectorXd> directions;
-  for (Eigen::Index j = columns.cols(); j-- > 0 && static_cast<int>(directions.size()) < most;) {
+  for (Eigen::Index j = columns.cols(); j-- > 0 && directions.size() < kMostDirections;) {
     if (!(gram.eigenvalues()[j] > kNegligible * kNegligible * gram.eigenvalues()[columns.cols() - 1])) break;
     directions.emplace_back(columns * gram.eigenvectors().col(j));
   }
@@ -26,9 +28,12 @@ std::vector<Eigen::VectorXd> principalDirections(const std::vector<Eigen::Vector
 
 }  // namespace
 
+bool PathEnrichment::worthAnother(const PathEnrichment& last) const {
+  return added > 0 && (last.added == 0 || missing <= kUseful * last.missing);
+}
+
 PathEnrichment enrich(const ShellStructurePtr& structure, double bending, GhostSpace& space,
-                      const std::vector<PathCoordinates>& paths, double tolerance, int most,
-                      const std::stop_token& stop) {
+                      const std::vector<PathCoordinates>& paths, double tolerance, const std::stop_token& stop) {
   PathEnrichment result;
   std::vector<Eigen::VectorXd> displacements;
   double displaced = 0, size = 0;
@@ -50,7 +55,7 @@ PathEnrichment enrich(const ShellStructurePtr& structure, double bending, GhostS
   }
   result.missing = std::sqrt(displaced / size);
   if (displacements.empty() || result.missing <= tolerance) return result;
-  for (const auto& direction : principalDirections(displacements, most))
+  for (const auto& direction : principalDirections(displacements))
     if (space.append(direction)) ++result.added;
   return result;
 }

@@ -10,13 +10,15 @@ struct PathEnrichment {
   /// How far the full problem's paths are from these, predicted: the norm of the displacements over that of the frames.
   double missing = 0;
   double residual = 0;  ///< the largest of FlowTangents::residual
+
+  /// Whether a further one may help: this one added something, and less is missing than before the last one.
+  bool worthAnother(const PathEnrichment& last) const;
 };
 
 /// Adds to a subspace where the full problem would move the inner frames of settled paths in it: the principal
-/// directions of FlowTangents::displacements, at most so many of them. Nothing once they are below `tolerance`, or
-/// the stop token has fired. The step beyond [BvTH16], whose subspace is made before the path is known.
+/// directions of FlowTangents::displacements, at most eight of them. Nothing once these are below `tolerance`, or the
+/// stop token has fired. The step beyond [BvTH16], whose subspace is made before the path is known.
 PathEnrichment enrich(const ShellStructurePtr& structure, double bending, GhostSpace& space,
-                      const std::vector<PathCoordinates>& paths, double tolerance, int most,
-                      const std::stop_token& stop = {});
+                      const std::vector<PathCoordinates>& paths, double tolerance, const std::stop_token& stop = {});
 
 }  // namespace shaped

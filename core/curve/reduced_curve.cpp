@@ -66,7 +66,8 @@ SmoothingFlow ReducedCurve::flow(const SmoothingFlowOptions& options) const {
   const auto solvers = std::make_shared<std::vector<ReducedSolver>>();
   for (const auto& frame : frames_) {
     coordinates.push_back(frame.start);
-    solvers->emplace_back(frame.space, PairEnergy(bending_, options_.symmetry), options_.tolerance, options.stop);
+    solvers->emplace_back(frame.space, PairEnergy(bending_, options_.symmetry), options_.tolerance, options.stop,
+                          options_.method);
   }
   const auto average = [solvers](std::size_t i, const std::vector<AverageTerm>& terms, const FlowFrame& now) {
     auto& solver = (*solvers)[i];

@@ -10,6 +10,7 @@ struct ReducedCurveOptions {
   int dimension = 15;                  ///< of the principal directions that all frames share, >= 1
   std::int32_t ghost_vertices = 1250;  ///< of the mesh on which energies are evaluated, >= 4; no more than there are
   EnergySymmetry symmetry = EnergySymmetry::kDirected;  ///< of the averages: (10), or (1) at twice the cost
+  AverageMethod method = AverageMethod::kBfgs;
   double tolerance = 1e-4;  ///< of a frame's solve: sqrt(gain left / energy of its terms), > 0
   std::stop_token stop = {};
 };

@@ -13,6 +13,7 @@
 namespace shaped {
 namespace {
 
+constexpr double kLeastShift = 1e-10, kMostShift = 1e-3;  ///< of the Hessian, times the mean of its diagonal
 constexpr double kGoodStep = 1. / 3;  ///< of the residual, at most, is left by a step with a Hessian that is still good
 
 double dot(const std::vector<Eigen::VectorXd>& a, const std::vector<Eigen::VectorXd>& b) {
@@ -54,32 +55,53 @@ Eigen::MatrixXd ReducedPathNewton::projected(const Multiply& multiply) const {
   return basis.transpose() * image;
 }
 
-bool ReducedPathNewton::factoriseAt(const State& state) {
-  const auto& structure = space_.structure();
-  const auto& topology = *space_.topology();
-  const std::size_t inner = state.path.size() - 2;
-  std::vector<Eigen::MatrixXd> diagonal(inner), above(inner - 1);
-  tbb::parallel_for(std::size_t{0}, inner, [&](std::size_t k) {
-    if (options_.stop.stop_requested()) return;
-    const auto& frames = state.curve.frames;
-    const auto &before = state.measures[k], &here = state.measures[k + 1], &after = state.measures[k + 2];
-    MeasureCurvature curvature(topology, HessianKind::kExact);
-    energy_.addSecondCurvature(topology, before, here, kBothDirections, curvature);
-    energy_.addFirstCurvature(topology, here, after, kBothDirections, curvature);
-    SymmetricBlockMatrix hessian(structure.pattern());
-    pullBackHessian(structure, frames[k + 1], curvature, hessian);
-    diagonal[k] = projected([&](const double* x, double* y) { hessian.multiplyAdd(x, y); });
-    if (k + 1 == inner) return;
-    GeneralBlockMatrix coupling(structure.pattern());
-    energy_.addMixedHessian(structure, frames[k + 1], here, frames[k + 2], after, kBothDirections, coupling);
-    above[k] = projected([&](const double* x, double* y) { coupling.multiplyAdd(1, x, y); });
-  });
-  if (options_.stop.stop_requested()) return false;
+Eigen::MatrixXd ReducedPathNewton::diagonalBlock(const State& state, std::size_t k, HessianKind kind) const {
+  const auto &before = state.measures[k], &here = state.measures[k + 1], &after = state.measures[k + 2];
+  MeasureCurvature curvature(*space_.topology(), kind);
+  energy_.addSecondCurvature(*space_.topology(), before, here, kBothDirections, curvature);
+  energy_.addFirstCurvature(*space_.topology(), here, after, kBothDirections, curvature);
+  SymmetricBlockMatrix hessian(space_.structure().pattern());
+  pullBackHessian(space_.structure(), state.curve.frames[k + 1], curvature, hessian);
+  return projected([&](const double* x, double* y) { hessian.multiplyAdd(x, y); });
+}
+
+Eigen::MatrixXd ReducedPathNewton::blockAbove(const State& state, std::size_t k) const {
+  GeneralBlockMatrix coupling(space_.structure().pattern());
+  energy_.addMixedHessian(space_.structure(), state.curve.frames[k + 1], state.measures[k + 1],
+                          state.curve.frames[k + 2], state.measures[k + 2], kBothDirections, coupling);
+  return projected([&](const double* x, double* y) { coupling.multiplyAdd(1, x, y); });
+}
+
+bool ReducedPathNewton::factoriseShifted(const std::vector<Eigen::MatrixXd>& diagonal,
+                                         const std::vector<Eigen::MatrixXd>& above, double most) {
   double scale = 0;
   for (const auto& block : diagonal) scale = std::max(scale, block.trace() / static_cast<double>(block.rows()));
-  for (double shift = 1e-10; shift < 10; shift *= 10)
+  for (double shift = kLeastShift; shift <= most; shift *= 10)
     if (factor_.factorise(diagonal, above, shift * scale)) return true;
   return false;
+}
+
+bool ReducedPathNewton::factoriseAt(const State& state) {
+  const std::size_t inner = state.path.size() - 2;
+  std::vector<Eigen::MatrixXd> diagonal(inner), above(inner - 1);
+  const auto eachFrame = [&](const auto& body) {
+    tbb::parallel_for(std::size_t{0}, inner, [&](std::size_t k) {
+      if (!options_.stop.stop_requested()) body(k);
+    });
+    return !options_.stop.stop_requested();
+  };
+  const auto exactly = [&](std::size_t k) {
+    diagonal[k] = diagonalBlock(state, k, HessianKind::kExact);
+    if (k + 1 < inner) above[k] = blockAbove(state, k);
+  };
+  if (!eachFrame(exactly)) return false;
+  if (factoriseShifted(diagonal, above, kMostShift)) return true;
+  // Far from any geodesic: each frame on its own, as the flow has it, with elements that are not indefinite.
+  const auto safely = [&](std::size_t k) {
+    diagonal[k] = diagonalBlock(state, k, HessianKind::kProjected);
+    if (k + 1 < inner) above[k].setZero();
+  };
+  return eachFrame(safely) && factoriseShifted(diagonal, above, 1);
 }
 
 Outcome ReducedPathNewton::settle(PathCoordinates& path) {

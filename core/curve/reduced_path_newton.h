@@ -7,7 +7,8 @@
 namespace shaped {
 
 /// Descends (4) in all inner frames of a path in a subspace at once, by Newton's method: the Hessian has dense blocks
-/// on three diagonals and is exact, with a multiple of one added where it is not positive definite.
+/// on three diagonals and is exact, with a small multiple of one added; where that is not positive definite, each frame
+/// steps on its own, with elements that are.
 ///
 /// The factorised Hessian is kept: later steps, and the next path of as many frames, use it for as long as each step
 /// with it leaves at most a third of the residual. The residual is sqrt(g^T B g / energy), B the inverse Hessian in
@@ -39,6 +40,12 @@ class ReducedPathNewton {
   Step stepFrom(const State& state, const std::vector<Eigen::VectorXd>& gradient, double last);
   /// False where it cannot be made positive definite, or stopped.
   bool factoriseAt(const State& state);
+  /// With as small a multiple of one as does it, at most `most` times the diagonal's mean.
+  bool factoriseShifted(const std::vector<Eigen::MatrixXd>& diagonal, const std::vector<Eigen::MatrixXd>& above,
+                        double most);
+  /// Of the Hessian: inner frame k with itself, and with the next.
+  Eigen::MatrixXd diagonalBlock(const State& state, std::size_t k, HessianKind kind) const;
+  Eigen::MatrixXd blockAbove(const State& state, std::size_t k) const;
   /// Of a matrix on the ghost mesh by its products with the basis.
   template <class Multiply>
   Eigen::MatrixXd projected(const Multiply& multiply) const;

@@ -1,20 +1,17 @@
 #include "core/curve/reduced_solver.h"
 
-#include <Eigen/Dense>
-
-#include "core/numerics/bfgs.h"
+#include "core/numerics/descent.h"
 
 namespace shaped {
 
 Solved<Eigen::VectorXd> ReducedSolver::average(const std::vector<AverageTerm>& terms, const Eigen::VectorXd& start) {
-  ReducedAverage function(space_, energy_, terms);
-  if (inverse_.size() == 0 && !stop_.stop_requested()) {
-    const Eigen::MatrixXd hessian = function.hessian(start);
-    const Eigen::MatrixXd one = Eigen::MatrixXd::Identity(hessian.rows(), hessian.cols());
-    inverse_ = (hessian + 1e-10 * hessian.trace() * one).llt().solve(one);
-  }
   if (stop_.stop_requested()) return {start, {Termination::kCancelled, 0, 0}};
-  return minimiseBfgs(std::ref(function), start, inverse_, {60, tolerance_, 0, function.noise(), stop_});
+  ReducedAverage function(space_, energy_, terms);
+  const DescentOptions options{60, tolerance_, 0, function.noise(), stop_};
+  const auto hessian = [&](const Eigen::VectorXd& coordinates) { return function.hessian(coordinates); };
+  if (method_ == AverageMethod::kNewton) return minimiseNewton(std::ref(function), hessian, start, options);
+  if (inverse_.size() == 0) inverse_ = regularInverse(hessian(start));
+  return minimiseBfgs(std::ref(function), start, inverse_, options);
 }
 
 }  // namespace shaped

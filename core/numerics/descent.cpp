@@ -1,5 +1,6 @@
-#include "core/numerics/bfgs.h"
+#include "core/numerics/descent.h"
 
+#include <Eigen/Cholesky>
 #include <algorithm>
 #include <cmath>
 
@@ -18,10 +19,15 @@ void update(Eigen::MatrixXd& inverse, const Eigen::VectorXd& step, const Eigen::
   inverse += scale * step * step.transpose() - (image * step.transpose() + step * image.transpose()) / curvature;
 }
 
-}  // namespace
+Eigen::MatrixXd regularised(const Eigen::MatrixXd& matrix) {
+  constexpr double share = 1e-10;  // of the trace
+  return matrix + share * matrix.trace() * Eigen::MatrixXd::Identity(matrix.rows(), matrix.cols());
+}
 
-Solved<Eigen::VectorXd> minimiseBfgs(const DifferentiableFunction& function, const Eigen::VectorXd& start,
-                                     Eigen::MatrixXd& inverse_hessian, const BfgsOptions& options) {
+/// direction(x, gradient); learn(step, change of the gradient over it).
+template <class Direction, class Learn>
+Solved<Eigen::VectorXd> descend(const DifferentiableFunction& function, const Eigen::VectorXd& start,
+                                const DescentOptions& options, const Direction& directionAt, const Learn& learn) {
   Eigen::VectorXd x = start, gradient(start.size()), next_gradient(start.size());
   double value = function(x, gradient);
   const double reference = options.reference > 0 ? options.reference : std::max({value, options.noise, kLeast});
@@ -29,7 +35,7 @@ Solved<Eigen::VectorXd> minimiseBfgs(const DifferentiableFunction& function, con
   for (outcome.iterations = 0;; ++outcome.iterations) {
     outcome.termination = Termination::kNumericalFailure;
     if (!std::isfinite(value) || !gradient.allFinite()) return {start, outcome};
-    const Eigen::VectorXd direction = -inverse_hessian * gradient;
+    const Eigen::VectorXd direction = directionAt(x, gradient);
     const double slope = direction.dot(gradient);
     outcome.residual = std::sqrt(std::max(-slope, 0.0) / reference);
     outcome.termination = Termination::kConverged;
@@ -45,12 +51,39 @@ Solved<Eigen::VectorXd> minimiseBfgs(const DifferentiableFunction& function, con
     }
     outcome.termination = Termination::kStalled;
     if (!(length > 1e-10)) break;
-    update(inverse_hessian, length * direction, next_gradient - gradient);
+    learn(length * direction, next_gradient - gradient);
     x += length * direction;
     value = next;
     std::swap(gradient, next_gradient);
   }
   return {x, outcome};
+}
+
+}  // namespace
+
+Solved<Eigen::VectorXd> minimiseBfgs(const DifferentiableFunction& function, const Eigen::VectorXd& start,
+                                     Eigen::MatrixXd& inverse_hessian, const DescentOptions& options) {
+  return descend(
+      function, start, options,
+      [&](const Eigen::VectorXd&, const Eigen::VectorXd& gradient) -> Eigen::VectorXd {
+        return -inverse_hessian * gradient;
+      },
+      [&](const Eigen::VectorXd& step, const Eigen::VectorXd& change) { update(inverse_hessian, step, change); });
+}
+
+Solved<Eigen::VectorXd> minimiseNewton(const DifferentiableFunction& function,
+                                       const std::function<Eigen::MatrixXd(const Eigen::VectorXd&)>& hessian,
+                                       const Eigen::VectorXd& start, const DescentOptions& options) {
+  return descend(
+      function, start, options,
+      [&](const Eigen::VectorXd& x, const Eigen::VectorXd& gradient) -> Eigen::VectorXd {
+        return -regularised(hessian(x)).llt().solve(gradient);
+      },
+      [](const Eigen::VectorXd&, const Eigen::VectorXd&) {});
+}
+
+Eigen::MatrixXd regularInverse(const Eigen::MatrixXd& matrix) {
+  return regularised(matrix).llt().solve(Eigen::MatrixXd::Identity(matrix.rows(), matrix.cols()));
 }
 
 }  // namespace shaped

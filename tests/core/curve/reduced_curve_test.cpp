@@ -132,6 +132,24 @@ TEST_CASE("the reduced flow lowers the path energy in every step and comes near 
   }
 }
 
+TEST_CASE("averages by Newton's method and by the BFGS method make the same flow") {
+  const auto curve = tremblingCurve();
+  const auto run = [&](AverageMethod method) {
+    const ReducedCurve reduced(pipe().topology, bending(), curve,
+                               {.dimension = 8, .ghost_vertices = 120, .method = method, .tolerance = 1e-7});
+    auto flow = reduced.flow({});
+    int iterations = 0;
+    for (int k = 0; k < 5; ++k) iterations += flow.step().iterations;
+    std::vector<Vertices> frames;
+    for (std::size_t i = 0; i < curve.size(); ++i) frames.push_back(reduced.fine(i, flow.frame(i)));
+    return std::pair(frames, iterations);
+  };
+  const auto [bfgs, many] = run(AverageMethod::kBfgs);
+  const auto [newton, few] = run(AverageMethod::kNewton);
+  for (std::size_t i = 0; i < curve.size(); ++i) CHECK((bfgs[i] - newton[i]).cwiseAbs().maxCoeff() < 1e-5);
+  CHECK(few < many);
+}
+
 TEST_CASE("a reduced flow that is stopped leaves its curve as it was") {
   std::stop_source stop;
   const auto curve = wavingCurve(6);

@@ -1,4 +1,4 @@
-#include "core/numerics/bfgs.h"
+#include "core/numerics/descent.h"
 
 #include <Eigen/Dense>
 #include <catch2/catch.hpp>
@@ -67,4 +67,25 @@ TEST_CASE("the BFGS method steps back from where a function is not defined, and 
   stop.request_stop();
   CHECK(minimiseBfgs(barrier, Eigen::VectorXd::Ones(1), inverse, {.stop = stop.get_token()}).termination ==
         Termination::kCancelled);
+}
+
+TEST_CASE("Newton's method finds the end of a curved valley in few steps and a quadratic's in one") {
+  const auto curvature = [](const Eigen::VectorXd& x) {
+    Eigen::MatrixXd hessian(2, 2);
+    hessian << 2 + 800 * x[0] * x[0], -400 * x[0], -400 * x[0], 200;  // without the indefinite part
+    return hessian;
+  };
+  const auto solved = minimiseNewton(valley, curvature, Eigen::Vector2d(-1.2, 1), {.tolerance = 1e-9, .reference = 1});
+  REQUIRE(solved.converged());
+  CHECK((solved.solution - Eigen::Vector2d(1, 1)).norm() < 1e-8);
+  CHECK(solved.iterations < 20);
+  const auto flat = [](const Eigen::VectorXd& x, Eigen::VectorXd& gradient) {
+    gradient = Eigen::Vector2d(2 * (x[0] - 3), 0);
+    return (x[0] - 3) * (x[0] - 3);
+  };
+  const auto singular = [](const Eigen::VectorXd&) -> Eigen::MatrixXd { return Eigen::Vector2d(2, 0).asDiagonal(); };
+  const auto once = minimiseNewton(flat, singular, Eigen::Vector2d(0, 5), {.tolerance = 1e-6, .reference = 1});
+  CHECK(once.converged());
+  CHECK(once.solution[0] == Approx(3).epsilon(1e-6));
+  CHECK(once.solution[1] == Approx(5));
 }
