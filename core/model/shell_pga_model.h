@@ -49,6 +49,7 @@ class ShellPgaModel {
   std::shared_ptr<const ShellPgaModel> withRecord(const TrainingRecord& record) const;
 
   const Topology& topology() const { return *parts_->topology; }
+  const TopologyPtr& topologyPtr() const { return parts_->topology; }
   const ShellPgaParts& parts() const { return *parts_; }
   const ShellPga& pga() const { return submanifold_->pga(); }
   const Submanifold& submanifold() const { return *submanifold_; }

@@ -18,6 +18,7 @@ struct Limits {
   std::int64_t path_steps = 1024;                     ///< K of an interpolation
   std::int64_t times = 10'000;                        ///< shapes that an interpolation sends
   std::int64_t job_bytes = std::int64_t{4} << 30;     ///< that are sent for one job, and of one job's result
+  std::int64_t curve_bytes = std::int64_t{512} << 20;  ///< of the frames that a curve holds at once, as doubles
   std::int64_t upload_bytes = std::int64_t{4} << 30;  ///< of an uploaded model's tensors
 };
 

@@ -14,6 +14,7 @@
 #include "server/jobs/job_runner.h"
 #include "server/jobs/sqlite_job_registry.h"
 #include "server/rpc/admin_service.h"
+#include "server/rpc/curves_service.h"
 #include "server/rpc/datasets_service.h"
 #include "server/rpc/job_context.h"
 #include "server/rpc/jobs_service.h"
@@ -75,6 +76,7 @@ class Daemon {
   DatasetsService datasets_service_;
   JobsService jobs_service_;
   ShapesService shapes_service_;
+  CurvesService curves_service_;
   ServerService server_service_;
   AdminService admin_service_;
   std::string address_;

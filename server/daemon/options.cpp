@@ -231,6 +231,10 @@ std::vector<OptionSpec> limitOptions() {
           "max-job-megabytes", "N", When::kAtStart, kMostMegabytes, [](auto& o) -> auto& { return o.limits.job_bytes; },
           "most that is sent for one job, and largest result of one [MiB]", 1 << 20),
       countOption(
+          "max-curve-megabytes", "N", When::kAtStart, kMostMegabytes,
+          [](auto& o) -> auto& { return o.limits.curve_bytes; },
+          "frames that a curve may hold in memory at once; the work takes about five times as much [MiB]", 1 << 20),
+      countOption(
           "max-upload-megabytes", "N", When::kAtStart, kMostCount,
           [](auto& o) -> auto& { return o.limits.upload_bytes; }, "largest model that an upload may bring [MiB]",
           1 << 20),

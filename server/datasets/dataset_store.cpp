@@ -76,6 +76,10 @@ std::string framePath(std::int64_t index, const std::string& label) {
   return "frames[" + std::to_string(index) + "]" + (label.empty() ? "" : " (" + label + ")");
 }
 
+Corrupted notAsUploaded(const std::string& name) {
+  return Corrupted("dataset \"" + name + "\" does not hold what was uploaded; delete it and upload it again");
+}
+
 }  // namespace
 
 DatasetUpload::DatasetUpload(DatasetStore& store, std::string name, TopologyPtr topology, std::int64_t frames,
@@ -181,22 +185,51 @@ DatasetInfo DatasetStore::get(const std::string& name) const {
   return found->second;
 }
 
-Dataset DatasetStore::load(const std::string& name) const {
+template <class Read>
+auto DatasetStore::reading(const std::string& name, const Read& read) const {
   const auto info = get(name);
   const auto folder = root_ / name;
   try {
     auto topology = std::make_shared<const Topology>(info.vertex_count, readFaces(folder));
+    if (topology->id() != info.topology_id) throw notAsUploaded(name);
+    return read(info, folder, std::move(topology));
+  } catch (const InvalidInput& error) {
+    get(name);  // deleted while we read it: NotFound says so
+    throw Corrupted("dataset \"" + name + "\" cannot be read: " + error.what());
+  }
+}
+
+Dataset DatasetStore::load(const std::string& name) const {
+  return reading(name, [&](const DatasetInfo& info, const fs::path& folder, TopologyPtr topology) -> Dataset {
     auto shapes = readFrames(folder / kFrames);
-    if (topology->id() != info.topology_id || std::ssize(shapes) != info.frames)
-      throw Corrupted("dataset \"" + name + "\" does not hold what was uploaded; delete it and upload it again");
+    if (std::ssize(shapes) != info.frames) throw notAsUploaded(name);
     std::optional<Vertices> template_shape;
     if (fs::exists(folder / kTemplate)) template_shape = readFrames(folder / kTemplate).front();
     for (const auto& shape : shapes) requireValidShape(*topology, shape, name);
     if (template_shape) requireValidShape(*topology, *template_shape, name);
     return {std::move(topology), std::move(shapes), std::move(template_shape)};
+  });
+}
+
+DatasetFrames DatasetStore::open(const std::string& name) const {
+  return reading(name, [&](const DatasetInfo& info, const fs::path& folder, TopologyPtr topology) {
+    auto reader = std::make_unique<FrameReader>(folder / kFrames);
+    if (reader->frameCount() != info.frames || reader->vertexCount() != info.vertex_count) throw notAsUploaded(name);
+    return DatasetFrames(name, std::move(topology), std::move(reader));
+  });
+}
+
+TopologyPtr DatasetStore::topology(const std::string& name) const {
+  return reading(name, [](const DatasetInfo&, const fs::path&, TopologyPtr topology) { return topology; });
+}
+
+Vertices DatasetFrames::frame(std::int64_t index) const {
+  try {
+    auto shape = reader_->frame(index);
+    requireValidShape(*topology_, shape, framePath(index, ""));
+    return shape;
   } catch (const InvalidInput& error) {
-    get(name);  // deleted while we read it: NotFound says so
-    throw Corrupted("dataset \"" + name + "\" cannot be read: " + error.what());
+    throw Corrupted("dataset \"" + name_ + "\" cannot be read: " + error.what());
   }
 }
 

@@ -31,6 +31,25 @@ struct Dataset {
   std::optional<Vertices> template_shape;  ///< V x 3: marker offsets are given in its axes
 };
 
+/// A dataset whose frames are read one by one. It stays readable when it is deleted meanwhile. For one thread at a
+/// time.
+class DatasetFrames {
+ public:
+  const TopologyPtr& topology() const { return topology_; }
+  std::int64_t count() const { return reader_->frameCount(); }
+  /// V x 3 [m], of index in [0, count()). Throws Corrupted when the file does not hold what was uploaded.
+  Vertices frame(std::int64_t index) const;
+
+ private:
+  friend class DatasetStore;
+  DatasetFrames(std::string name, TopologyPtr topology, std::unique_ptr<FrameReader> reader)
+      : name_(std::move(name)), topology_(std::move(topology)), reader_(std::move(reader)) {}
+
+  std::string name_;
+  TopologyPtr topology_;
+  std::unique_ptr<FrameReader> reader_;
+};
+
 class DatasetStore;
 
 /// A dataset on its way in: frames are checked and written as they come. Destroyed before commit(), it leaves nothing.
@@ -83,12 +102,19 @@ class DatasetStore {
   DatasetInfo get(const std::string& name) const;
   /// Reads a dataset. Throws NotFound; Corrupted when its files do not hold what was uploaded.
   Dataset load(const std::string& name) const;
+  /// Opens a dataset for reading frame by frame. Throws as load().
+  DatasetFrames open(const std::string& name) const;
+  /// Its connectivity alone. Throws as load().
+  TopologyPtr topology(const std::string& name) const;
   /// Throws NotFound; FileError when the disk fails.
   void remove(const std::string& name);
 
  private:
   friend class DatasetUpload;
   std::filesystem::path scratchFolder();
+  /// What read(info, folder, topology) returns.
+  template <class Read>
+  auto reading(const std::string& name, const Read& read) const;
   DatasetInfo publish(const DatasetUpload& upload);
 
   const std::filesystem::path root_;

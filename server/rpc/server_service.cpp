@@ -18,6 +18,7 @@ void toProto(const Limits& limits, v1::Limits& message) {
   message.set_path_steps(number(limits.path_steps));
   message.set_times(number(limits.times));
   message.set_job_bytes(number(limits.job_bytes));
+  message.set_curve_bytes(number(limits.curve_bytes));
   message.set_upload_bytes(number(limits.upload_bytes));
 }
 

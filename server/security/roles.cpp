@@ -50,6 +50,10 @@ const std::map<std::string_view, std::vector<Role>>& methods() {
       {"/shaped.v1.Shapes/FitMarkers", {Role::kInfer}},
       {"/shaped.v1.Shapes/Score", {Role::kInfer}},
       {"/shaped.v1.Shapes/Evaluate", {Role::kInfer}},
+      {"/shaped.v1.Curves/Smooth", {Role::kInfer}},
+      {"/shaped.v1.Curves/Geodesic", {Role::kInfer}},
+      {"/shaped.v1.Curves/Bezier", {Role::kInfer}},
+      {"/shaped.v1.Curves/Join", {Role::kInfer}},
   };
   return table;
 }

@@ -119,3 +119,32 @@ TEST_CASE("names are safe folder names") {
                           std::string("a b"), std::string("a\0b", 3), std::string("-a"), std::string(101, 'a')})
     CHECK_THROWS_AS(requireName(bad, "name"), InvalidInput);
 }
+
+TEST_CASE("a dataset is read frame by frame, also when it is deleted meanwhile") {
+  const test::TemporaryFolder folder;
+  DatasetStore store(folder.path());
+  const auto other = test::jitter(sphere.vertices, 0.01, 1);
+  put(store, "spheres", {sphere.vertices, other});
+  CHECK(store.topology("spheres")->id() == sphere.topology->id());
+  const auto frames = store.open("spheres");
+  CHECK(frames.count() == 2);
+  CHECK(frames.topology()->id() == sphere.topology->id());
+  store.remove("spheres");
+  CHECK((frames.frame(1) - other).cwiseAbs().maxCoeff() < 1e-6);
+  CHECK_THROWS_AS(store.open("spheres"), NotFound);
+  CHECK_THROWS_AS(store.topology("spheres"), NotFound);
+}
+
+TEST_CASE("a dataset whose frames were spoiled on the disk says so when it is read") {
+  const test::TemporaryFolder folder;
+  DatasetStore store(folder.path());
+  put(store, "spheres", {sphere.vertices, sphere.vertices});
+  auto spoiled = sphere.vertices;
+  spoiled.row(sphere.topology->faces()(0, 0)) = spoiled.row(sphere.topology->faces()(0, 1));
+  writeFrames(folder.path() / "spheres" / "frames.npy", {sphere.vertices, spoiled});
+  const auto frames = store.open("spheres");
+  CHECK_NOTHROW(frames.frame(0));
+  CHECK_THROWS_AS(frames.frame(1), Corrupted);
+  writeFrames(folder.path() / "spheres" / "frames.npy", {sphere.vertices});
+  CHECK_THROWS_AS(store.open("spheres"), Corrupted);
+}
