@@ -44,4 +44,13 @@ std::vector<std::int64_t> framesOf(const std::string& range, std::int64_t frame_
   return frames;
 }
 
+std::vector<std::int64_t> thinned(const std::vector<std::int64_t>& frames, std::int64_t most) {
+  const auto count = static_cast<std::int64_t>(frames.size());
+  if (count <= most) return frames;
+  std::vector<std::int64_t> result;
+  for (std::int64_t i = 0; i < most; ++i)
+    result.push_back(frames[static_cast<std::size_t>(i * (count - 1) / (most - 1))]);
+  return result;
+}
+
 }  // namespace shaped::shapectl

@@ -1,6 +1,7 @@
 #include "client/shapectl/render_source.h"
 
 #include <filesystem>
+#include <limits>
 
 #include "client/shapectl/frame_range.h"
 #include "core/io/frames.h"
@@ -11,19 +12,9 @@
 namespace shaped::shapectl {
 namespace {
 
-constexpr std::int64_t kMostFrames = 24;
-
 bool isStack(const std::string& file) { return std::filesystem::path(file).extension() == ".npy"; }
 
 std::string stemOf(const std::string& file) { return std::filesystem::path(file).stem().string(); }
-
-/// All frames, or evenly spaced ones with the first and last when there are too many to look at.
-std::vector<std::int64_t> chosenFrames(const std::string& range, std::int64_t count) {
-  if (!range.empty() || count <= kMostFrames) return framesOf(range, count);
-  std::vector<std::int64_t> frames;
-  for (std::int64_t i = 0; i < kMostFrames; ++i) frames.push_back(i * (count - 1) / (kMostFrames - 1));
-  return frames;
-}
 
 void addFrames(std::vector<RenderItem>& items, const std::string& file, const RenderSource& source) {
   if (source.template_file.empty())
@@ -33,7 +24,8 @@ void addFrames(std::vector<RenderItem>& items, const std::string& file, const Re
   if (faces.maxCoeff() >= frames.vertexCount())
     throw InvalidInput(file, "has " + std::to_string(frames.vertexCount()) +
                                  " vertices a frame, too few for the faces of " + source.template_file);
-  for (const auto frame : chosenFrames(source.frames, frames.frameCount()))
+  constexpr std::int64_t most = 24, any = std::numeric_limits<std::int64_t>::max();
+  for (const auto frame : thinned(framesOf(source.frames, frames.frameCount()), source.frames.empty() ? most : any))
     items.push_back({frames.frame(frame), faces, stemOf(file) + " " + std::to_string(frame), {}});
 }
 

@@ -26,7 +26,7 @@ class Wire(DaemonCase):
         method = self.channel.stream_stream("/grpc.reflection.v1alpha.ServerReflection/ServerReflectionInfo",
                                             lambda data: data, lambda data: data)
         answer = next(method(iter([list_services]), timeout=10))
-        for service in ("Models", "Datasets", "Jobs", "Shapes", "Server", "Admin"):
+        for service in ("Models", "Datasets", "Jobs", "Shapes", "Curves", "Server", "Admin"):
             self.assertIn(b"shaped.v1." + service.encode(), answer)
 
     def test_limits_are_told(self):
