@@ -33,6 +33,10 @@ void row10HandleEdits();
 void row11RigidMotions();
 /// Row "curves".
 void curves();
+/// Row "motions".
+void motions();
+/// Row "denoising".
+void denoising();
 /// Row "stop".
 void stopLatency();
 

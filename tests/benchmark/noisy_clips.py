@@ -1,0 +1,85 @@
+"""Clean and noisy motions for row 8 of the table on curves: noisy_clips.py DATA DEST [CLIP...]
+
+Skins a body of body_sequences by its own joint rotations, and again with noise that differs from frame to frame: `pose`, each joint
+turned by a random rotation of 1 degree (standard deviation of each axis); `vertex`, each vertex displaced by 1 mm (each axis); `both`.
+Writes DEST/CLIP_{clean,pose,vertex,both}.npy (frames, 1250, 3) and the mesh DEST/CLIP.ply. CLIP: run_muscular, walk_child and sword_muscular unless given.
+"""
+
+import json
+import pathlib
+import shutil
+import sys
+
+import numpy
+
+
+def rotations(vectors):
+    """Axis-angle vectors, any leading shape, to matrices."""
+    angle = numpy.linalg.norm(vectors, axis=-1)[..., None, None]
+    x, y, z = numpy.moveaxis(vectors, -1, 0)
+    zero = numpy.zeros_like(x)
+    cross = numpy.stack([zero, -z, y, z, zero, -x, -y, x, zero], -1).reshape(*x.shape, 3, 3)
+    safe = numpy.maximum(angle, 1e-12)
+    return numpy.eye(3) + numpy.sin(angle) / safe * cross + (1 - numpy.cos(angle)) / safe ** 2 * cross @ cross
+
+
+def skinned(rest, weights, joints, parents, locals_):
+    """x = sum_j w_j (G_j (v - r_j) + p_j), G_j = G_parent exp(w_j), p_j = p_parent + G_parent (r_j - r_parent)."""
+    frames = []
+    for local in locals_:
+        turns, places = [], []
+        for j, parent in enumerate(parents):
+            if parent < 0:
+                turns.append(local[j])
+                places.append(joints[j])
+            else:
+                turns.append(turns[parent] @ local[j])
+                places.append(places[parent] + turns[parent] @ (joints[j] - joints[parent]))
+        moved = numpy.einsum("jab,vjb->vja", numpy.stack(turns), rest[:, None] - joints) + numpy.stack(places)
+        frames.append(numpy.einsum("vj,vja->va", weights, moved))
+    return numpy.stack(frames)
+
+
+def read_vertices(path, count):
+    data = path.read_bytes()
+    start = data.index(b"end_header\n") + len(b"end_header\n")
+    return numpy.frombuffer(data, "<f4", 3 * count, start).reshape(count, 3).astype(float)
+
+
+def main(data, dest, clips):
+    data, dest = pathlib.Path(data), pathlib.Path(dest)
+    dest.mkdir(parents=True, exist_ok=True)
+    hierarchy = json.loads((data / "body_sequences/hierarchy.json").read_text())
+    index = numpy.load(data / "posed_body/coarse_1k/vertex_index_in_full_i32.npy")
+    sparse = numpy.load(data / "posed_body/rig/weights_sparse.npz")
+    whole = numpy.zeros((13380, len(hierarchy["joints"])))
+    numpy.add.at(whole, (sparse["vertex"], sparse["joint"]), sparse["weight"])
+    weights = whole[index]
+    for clip in clips:
+        name, body = clip.rsplit("_", 1)
+        rest = read_vertices(data / f"body_sequences/rest_1k_{body}.ply", len(index))
+        joints = numpy.array(hierarchy["identities"][body]["rest_joint_positions_m"])
+        vectors = numpy.load(data / f"body_sequences/motion_{name}_{body}_rotvec_f32.npy").astype(float)
+        random = numpy.random.default_rng(7)
+        clean_turns = rotations(vectors)
+        noise = rotations(numpy.radians(1) * random.standard_normal(vectors.shape))
+        noise[:, 0] = numpy.eye(3)  # the root's rotation changes no shape
+        shake = 0.001 * random.standard_normal((len(vectors), *rest.shape))
+        clean = skinned(rest, weights, joints, hierarchy["parents"], clean_turns)
+        posed = skinned(rest, weights, joints, hierarchy["parents"], clean_turns @ noise)
+        truth = numpy.load(data / f"body_sequences/seq_{clip}_1k_f32.npy")
+        print(f"{clip}: {len(clean)} frames; the skinning differs from the data by {abs(clean - truth).max() * 1000:.2f} mm; noise"
+              f" [mm RMS]: pose {rms(posed - clean):.1f}, vertex {rms(shake):.1f}")
+        for kind, frames in (("clean", clean), ("pose", posed), ("vertex", clean + shake), ("both", posed + shake)):
+            numpy.save(dest / f"{clip}_{kind}.npy", frames.astype(numpy.float32))
+        shutil.copy(data / f"body_sequences/rest_1k_{body}.ply", dest / f"{clip}.ply")
+
+
+def rms(difference):
+    return 1000 * numpy.sqrt((difference ** 2).sum(-1).mean())
+
+
+if __name__ == "__main__":
+    if len(sys.argv) < 3:
+        sys.exit(__doc__)
+    main(sys.argv[1], sys.argv[2], sys.argv[3:] or ["run_muscular", "walk_child", "sword_muscular"])
