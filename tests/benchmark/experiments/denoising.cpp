@@ -26,7 +26,9 @@ constexpr double kMillimetres = 1000, kPercent = 100;
 /// What a filter made of a motion, against the clean one.
 struct Quality {
   double error = 0;      ///< RMS distance of vertices, each frame aligned [m]
+  double elastic = 0;    ///< root of the mean energy E[frame, clean frame] [m]
   double roughness = 0;  ///< RMS second difference of vertices in time [m]
+  double energy = 0;     ///< path energy (4) [m^2]
   double volume = 0;     ///< largest relative change over the frames
   double limbs = 0;      ///< largest relative change of a limb's extent over limbs and frames
   std::string how;
@@ -54,7 +56,8 @@ Eigen::VectorXd extents(const Vertices& shape, const std::vector<std::vector<Eig
 
 class Judge {
  public:
-  Judge(TopologyPtr topology, std::vector<Vertices> clean) : topology_(std::move(topology)), clean_(std::move(clean)) {
+  Judge(TopologyPtr topology, std::vector<Vertices> clean)
+      : topology_(std::move(topology)), clean_(std::move(clean)), bending_(defaultBending(clean_.front())) {
     constexpr std::int64_t any[] = {-1};
     const auto joints = readNpy(dataPath("posed_body/rig/dominant_joint_1k_i8.npy"), any);
     std::vector<std::vector<Eigen::Index>> parts(64);
@@ -78,6 +81,12 @@ class Judge {
       const Eigen::ArrayXd limbs = extents(frame, limbs_).array() / extents(truth, limbs_).array() - 1;
       quality.limbs = std::max(quality.limbs, limbs.abs().maxCoeff());
     }
+    const auto measures = measuresOf(*topology_, curve), truths = measuresOf(*topology_, {clean_, false});
+    for (const double energy : segmentEnergies(*topology_, bending_, curve, measures)) quality.energy += energy;
+    const PairEnergy energy(bending_, EnergySymmetry::kSymmetric);
+    for (std::size_t i = 1; i < last; ++i)
+      quality.elastic += kBothDirections * energy.value(*topology_, measures[i], truths[i]);
+    quality.elastic = std::sqrt(quality.elastic / static_cast<double>(last - 1));
     const auto count = static_cast<double>((last - 1) * static_cast<std::size_t>(clean_[0].rows()));
     quality.error = std::sqrt(squares / count);
     quality.roughness = std::sqrt(second / count);
@@ -87,13 +96,15 @@ class Judge {
  private:
   TopologyPtr topology_;
   std::vector<Vertices> clean_;
+  double bending_;
   std::vector<std::vector<Eigen::Index>> limbs_;
 };
 
 std::string told(const Quality& quality) {
-  return text("%s: error %.2f mm, roughness %.2f mm, volume %.2f %%, limbs %.2f %%", quality.how.c_str(),
-              kMillimetres * quality.error, kMillimetres * quality.roughness, kPercent * quality.volume,
-              kPercent * quality.limbs);
+  return text(
+      "%s: error %.2f mm, elastic %.4f m, roughness %.2f mm, path energy %.4f m^2, volume %.2f %%, limbs %.2f %%",
+      quality.how.c_str(), kMillimetres * quality.error, quality.elastic, kMillimetres * quality.roughness,
+      quality.energy, kPercent * quality.volume, kPercent * quality.limbs);
 }
 
 std::vector<Quality> flows(const Judge& judge, const ShellStructurePtr& structure, const Curve& noisy) {
@@ -126,6 +137,27 @@ std::vector<Quality> bilaterals(const Judge& judge, const Curve& noisy) {
   return results;
 }
 
+using Measure = double Quality::*;
+
+/// The flow that is furthest ahead of the best bilateral filter that is at least as smooth.
+void compareAtEqual(Report& report, const std::string& title, const std::vector<Quality>& ours,
+                    const std::vector<Quality>& theirs, Measure error, Measure smoothness) {
+  const Quality *best = nullptr, *rival = nullptr;
+  double ratio = 0;
+  for (const auto& flow : ours) {
+    const Quality* equal = nullptr;
+    for (const auto& other : theirs)
+      if (other.*smoothness <= flow.*smoothness && (equal == nullptr || other.*error < equal->*error)) equal = &other;
+    if (equal == nullptr || equal->*error / flow.*error <= ratio) continue;
+    ratio = equal->*error / flow.*error;
+    best = &flow;
+    rival = equal;
+  }
+  if (best == nullptr) return report.entry(title, "no bilateral filter is as smooth");
+  report.entry(title, text("%.2f; ", ratio) + told(*best) + "; " + told(*rival), ">= 2; <= 1 %",
+               ratio >= 2 && best->volume <= 0.01 && best->limbs <= 0.01);
+}
+
 void denoise(Report& report, const std::string& clip, const std::string& kind) {
   const char* given = std::getenv("SHAPED_NOISY");
   const std::filesystem::path folder = given != nullptr ? given : "/tmp/noisy";
@@ -134,28 +166,18 @@ void denoise(Report& report, const std::string& clip, const std::string& kind) {
   const auto topology = bodies1k().topology;
   const Judge judge(topology, readFrames(folder / (clip + "_clean.npy")));
   const Curve noisy{readFrames(folder / (clip + "_" + kind + ".npy")), false};
-  report.entry(clip + ", " + kind, told(judge(noisy, "as it is")));
-  const auto ours = flows(judge, std::make_shared<const ShellStructure>(topology), noisy),
-             theirs = bilaterals(judge, noisy);
-  const Quality* best = nullptr;
-  const Quality* rival = nullptr;
-  double ratio = 0;
-  for (const auto& flow : ours) {
-    const Quality* equal = nullptr;  // the best bilateral filter that leaves no more roughness
-    for (const auto& other : theirs)
-      if (other.roughness <= flow.roughness && (equal == nullptr || other.error < equal->error)) equal = &other;
-    if (equal == nullptr || equal->error / flow.error <= ratio) continue;
-    ratio = equal->error / flow.error;
-    best = &flow;
-    rival = equal;
-  }
+  const std::string title = clip + ", " + kind;
+  report.entry(title, told(judge(noisy, "as it is")));
+  const auto ours = flows(judge, std::make_shared<const ShellStructure>(topology), noisy);
+  const auto theirs = bilaterals(judge, noisy);
   const auto less = [](const Quality& a, const Quality& b) { return a.error < b.error; };
-  report.entry(clip + ", " + kind + ", least error", told(*std::min_element(ours.begin(), ours.end(), less)) + "; " +
-                                                         told(*std::min_element(theirs.begin(), theirs.end(), less)));
-  if (best == nullptr) return;
-  report.entry(clip + ", " + kind + ", at equal smoothness",
-               told(*best) + "; " + told(*rival) + text("; ratio %.2f", ratio), ">= 2; <= 1 %",
-               ratio >= 2 && best->volume <= 0.01 && best->limbs <= 0.01);
+  report.entry(title + ", least error", told(*std::min_element(ours.begin(), ours.end(), less)) + "; " +
+                                            told(*std::min_element(theirs.begin(), theirs.end(), less)));
+  for (const auto& [name, measure] :
+       {std::pair{"error", &Quality::error}, std::pair{"elastic error", &Quality::elastic}}) {
+    compareAtEqual(report, title + ", " + name + " at equal roughness", ours, theirs, measure, &Quality::roughness);
+    compareAtEqual(report, title + ", " + name + " at equal path energy", ours, theirs, measure, &Quality::energy);
+  }
 }
 
 }  // namespace

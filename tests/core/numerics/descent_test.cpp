@@ -80,7 +80,8 @@ TEST_CASE("Newton's method finds the end of a curved valley in few steps and a q
   CHECK((solved.solution - Eigen::Vector2d(1, 1)).norm() < 1e-8);
   CHECK(solved.iterations < 20);
   const auto flat = [](const Eigen::VectorXd& x, Eigen::VectorXd& gradient) {
-    gradient = Eigen::Vector2d(2 * (x[0] - 3), 0);
+    gradient.setZero(2);
+    gradient[0] = 2 * (x[0] - 3);
     return (x[0] - 3) * (x[0] - 3);
   };
   const auto singular = [](const Eigen::VectorXd&) -> Eigen::MatrixXd { return Eigen::Vector2d(2, 0).asDiagonal(); };
