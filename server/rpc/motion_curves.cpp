@@ -26,8 +26,12 @@ LongClipOptions optionsFrom(const v1::SmoothRequest& request, const DatasetFrame
   options.smoothing.flow.held = heldFromProto(request.held(), frames.count());
   options.window =
       numberFromProto(request.window(), static_cast<int>(options.window), kLeastWindow, kMostWindow, "window");
+  // Many steps reach so far that a window sees more frames than it was asked to have.
+  const auto reach = flowReach(options.smoothing.steps, options.smoothing.flow.tau);
+  const auto seen = std::max(options.window, 2 * (reach + options.blend) + 1);
   const bool whole = request.closed() || frames.count() <= options.window;
-  requireCurveFits(whole ? frames.count() : options.window, vertices, limits, whole ? "dataset" : "window");
+  requireCurveFits(whole ? frames.count() : std::min(seen, frames.count()), vertices, limits,
+                   whole ? "dataset" : "window");
   return options;
 }
 
