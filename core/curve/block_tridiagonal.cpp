@@ -18,13 +18,15 @@ bool BlockTridiagonalCholesky::factorise(const std::vector<Eigen::MatrixXd>& dia
   return true;
 }
 
-std::vector<Eigen::VectorXd> BlockTridiagonalCholesky::solve(std::vector<Eigen::VectorXd> right) const {
-  for (std::size_t i = 0; i < right.size(); ++i) {
-    if (i > 0) right[i].noalias() -= above_[i - 1].transpose() * right[i - 1];
-    right[i] = pivots_[i].solve(right[i]);
+Eigen::VectorXd BlockTridiagonalCholesky::solve(const Eigen::VectorXd& right) const {
+  Eigen::VectorXd result = right;
+  const auto part = [&](std::size_t i) { return result.segment(static_cast<Eigen::Index>(i) * size(), size()); };
+  for (std::size_t i = 0; i < blocks(); ++i) {
+    if (i > 0) part(i).noalias() -= above_[i - 1].transpose() * part(i - 1);
+    pivots_[i].solveInPlace(part(i));
   }
-  for (std::size_t i = right.size(); i-- > 1;) right[i - 1] -= pivots_[i - 1].solve(above_[i - 1] * right[i]);
-  return right;
+  for (std::size_t i = blocks(); i-- > 1;) part(i - 1) -= pivots_[i - 1].solve(above_[i - 1] * part(i));
+  return result;
 }
 
 }  // namespace shaped

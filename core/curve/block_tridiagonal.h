@@ -13,8 +13,8 @@ class BlockTridiagonalCholesky {
   /// to the diagonal, >= 0. False where the sum is not positive definite; then there is nothing to solve with.
   bool factorise(const std::vector<Eigen::MatrixXd>& diagonal, const std::vector<Eigen::MatrixXd>& above, double shift);
 
-  /// n vectors of d.
-  std::vector<Eigen::VectorXd> solve(std::vector<Eigen::VectorXd> right) const;
+  /// right: n times d entries, block by block.
+  Eigen::VectorXd solve(const Eigen::VectorXd& right) const;
   std::size_t blocks() const { return pivots_.size(); }                               ///< 0: nothing to solve with
   Eigen::Index size() const { return pivots_.empty() ? 0 : pivots_.front().rows(); }  ///< of a block
 

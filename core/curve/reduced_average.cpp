@@ -64,16 +64,10 @@ Eigen::MatrixXd ReducedAverage::hessian(const Eigen::VectorXd& coordinates) {
     addFirstCurvature(topology_, measures_, *term.measures, bending_, term.weight, curvature);
   SymmetricBlockMatrix matrix(space_.shared->structure().pattern());
   pullBackHessian(space_.shared->structure(), shape_, curvature, matrix);
-  Eigen::MatrixXd hessian(space_.dimension(), space_.dimension());
-  Eigen::VectorXd image(shape_.size()), column;
-  for (Eigen::Index j = 0; j < hessian.cols(); ++j) {
-    const bool shared = j < space_.shared->dimension();
-    const double* direction = shared ? space_.shared->basis().col(j).data() : space_.own.data();
-    image.setZero();
-    matrix.multiplyAdd(direction, image.data());
-    project(image, column);
-    hessian.col(j) = column;
-  }
+  VectorBundle basis(shape_.size(), space_.dimension());
+  basis.leftCols(space_.shared->dimension()) = space_.shared->basis();
+  if (space_.own.size() > 0) basis.rightCols<1>() = space_.own;
+  const Eigen::MatrixXd hessian = basis.transpose() * (matrix * basis);
   return 0.5 * (hessian + hessian.transpose());
 }
 

@@ -4,8 +4,9 @@
 
 #include <algorithm>
 #include <cmath>
-#include <limits>
 #include <numeric>
+#include <optional>
+#include <utility>
 
 #include "core/curve/reduced_average.h"
 #include "core/numerics/newton.h"
@@ -14,12 +15,25 @@ namespace shaped {
 namespace {
 
 constexpr double kLeastShift = 1e-10, kMostShift = 1e-3;  ///< of the Hessian, times the mean of its diagonal
-constexpr double kGoodStep = 1. / 3;  ///< of the residual, at most, is left by a step with a Hessian that is still good
 
-double dot(const std::vector<Eigen::VectorXd>& a, const std::vector<Eigen::VectorXd>& b) {
-  return std::inner_product(a.begin(), a.end(), b.begin(), 0.0, std::plus<>(),
-                            [](const Eigen::VectorXd& x, const Eigen::VectorXd& y) { return x.dot(y); });
-}
+/// Whether steps with one Hessian are still worth their time.
+class Pace {
+ public:
+  explicit Pace(double residual) : residual_(residual) {}
+  /// After a step.
+  bool keepsUp(double residual) {
+    if (++steps_ < kSteps) return true;
+    const bool fast = residual <= kLeft * residual_;
+    *this = Pace(residual);
+    return fast;
+  }
+
+ private:
+  static constexpr int kSteps = 6;
+  static constexpr double kLeft = 0.2;  ///< of the residual, at most, after so many steps
+  double residual_;
+  int steps_ = 0;
+};
 
 }  // namespace
 
@@ -35,24 +49,25 @@ ReducedPathNewton::State ReducedPathNewton::stateOf(PathCoordinates path) const 
   return state;
 }
 
-std::vector<Eigen::VectorXd> ReducedPathNewton::gradientAt(const State& state) const {
+ReducedPathNewton::State ReducedPathNewton::moved(const State& state, const Eigen::VectorXd& step) const {
+  auto path = state.path;
+  for (std::size_t k = 0; k + 2 < path.size(); ++k)
+    path[k + 1] += step.segment(static_cast<Eigen::Index>(k) * space_.dimension(), space_.dimension());
+  return stateOf(std::move(path));
+}
+
+Eigen::VectorXd ReducedPathNewton::gradientAt(const State& state) const {
   const auto& topology = *space_.topology();
-  std::vector<Eigen::VectorXd> gradient(state.path.size() - 2);
-  tbb::parallel_for(std::size_t{0}, gradient.size(), [&](std::size_t k) {
+  const auto dimension = space_.dimension();
+  Eigen::VectorXd gradient(static_cast<Eigen::Index>(state.path.size() - 2) * dimension);
+  tbb::parallel_for(std::size_t{0}, state.path.size() - 2, [&](std::size_t k) {
     const auto& measures = state.measures;
     const Vertices force =
         curveGradient(topology, energy_, state.curve.frames[k + 1], measures[k], measures[k + 1], measures[k + 2]);
-    gradient[k] = space_.basis().transpose() * Eigen::Map<const Eigen::VectorXd>(force.data(), force.size());
+    gradient.segment(static_cast<Eigen::Index>(k) * dimension, dimension).noalias() =
+        space_.basis().transpose() * Eigen::Map<const Eigen::VectorXd>(force.data(), force.size());
   });
   return gradient;
-}
-
-template <class Multiply>
-Eigen::MatrixXd ReducedPathNewton::projected(const Multiply& multiply) const {
-  const auto& basis = space_.basis();
-  Eigen::MatrixXd image = Eigen::MatrixXd::Zero(basis.rows(), basis.cols());
-  for (Eigen::Index j = 0; j < basis.cols(); ++j) multiply(basis.col(j).data(), image.col(j).data());
-  return basis.transpose() * image;
 }
 
 Eigen::MatrixXd ReducedPathNewton::diagonalBlock(const State& state, std::size_t k, HessianKind kind) const {
@@ -62,14 +77,14 @@ Eigen::MatrixXd ReducedPathNewton::diagonalBlock(const State& state, std::size_t
   energy_.addFirstCurvature(*space_.topology(), here, after, kBothDirections, curvature);
   SymmetricBlockMatrix hessian(space_.structure().pattern());
   pullBackHessian(space_.structure(), state.curve.frames[k + 1], curvature, hessian);
-  return projected([&](const double* x, double* y) { hessian.multiplyAdd(x, y); });
+  return basis_.transpose() * (hessian * basis_);
 }
 
 Eigen::MatrixXd ReducedPathNewton::blockAbove(const State& state, std::size_t k) const {
   GeneralBlockMatrix coupling(space_.structure().pattern());
   energy_.addMixedHessian(space_.structure(), state.curve.frames[k + 1], state.measures[k + 1],
                           state.curve.frames[k + 2], state.measures[k + 2], kBothDirections, coupling);
-  return projected([&](const double* x, double* y) { coupling.multiplyAdd(1, x, y); });
+  return basis_.transpose() * (coupling * basis_);
 }
 
 bool ReducedPathNewton::factoriseShifted(const std::vector<Eigen::MatrixXd>& diagonal,
@@ -82,6 +97,7 @@ bool ReducedPathNewton::factoriseShifted(const std::vector<Eigen::MatrixXd>& dia
 }
 
 bool ReducedPathNewton::factoriseAt(const State& state) {
+  if (basis_.cols() != space_.dimension()) basis_ = space_.basis();
   const std::size_t inner = state.path.size() - 2;
   std::vector<Eigen::MatrixXd> diagonal(inner), above(inner - 1);
   const auto eachFrame = [&](const auto& body) {
@@ -107,59 +123,51 @@ bool ReducedPathNewton::factoriseAt(const State& state) {
 Outcome ReducedPathNewton::settle(PathCoordinates& path) {
   if (path.size() < 3) return {};
   State now = stateOf(path);
-  const bool kept = factor_.blocks() == path.size() - 2 && factor_.size() == space_.dimension();
-  double last = kept ? std::numeric_limits<double>::infinity() : 0;  // residual; 0 asks for a new factor
+  Eigen::VectorXd gradient = gradientAt(now);
+  bool usable = factor_.blocks() == path.size() - 2 && factor_.size() == space_.dimension();
+  bool fresh = false;  // the Hessian is that of where the path is now
+  pairs_.clear();
+  std::optional<Pace> pace;
   Outcome outcome;
   for (;; ++outcome.iterations) {
     outcome.termination = Termination::kNumericalFailure;
     if (!std::isfinite(now.energy)) return outcome;
     outcome.termination = Termination::kCancelled;
     if (options_.stop.stop_requested()) break;
-    const auto gradient = gradientAt(now);
-    const auto step = stepFrom(now, gradient, last);
-    if (!step.found) {
-      if (!options_.stop.stop_requested()) outcome.termination = Termination::kNumericalFailure;
-      break;
+    if (!usable) {
+      pairs_.clear();
+      pace.reset();
+      usable = fresh = factoriseAt(now);
+      if (!usable && !options_.stop.stop_requested()) outcome.termination = Termination::kNumericalFailure;
+      if (!usable) break;
     }
-    outcome.residual = step.residual;
+    const Eigen::VectorXd descent =
+        pairs_.multiply([&](const Eigen::VectorXd& v) { return factor_.solve(v); }, gradient);
+    const double slope = gradient.dot(descent);
+    outcome.residual = std::sqrt(std::max(slope, 0.0) / std::max(now.energy, now.noise));
     outcome.termination = Termination::kConverged;
     if (outcome.residual <= options_.tolerance) break;
     outcome.termination = Termination::kIterationLimit;
     if (outcome.iterations >= options_.steps) break;
+    if (!pace) pace.emplace(outcome.residual);
     State next;
     const auto moveTo = [&](double t) {
-      auto moved = now.path;
-      for (std::size_t k = 0; k < gradient.size(); ++k) moved[k + 1] -= t * step.descent[k];
-      next = stateOf(std::move(moved));
+      next = moved(now, -t * descent);
       return next.energy;
     };
-    const bool lower = backtrack(moveTo, now.energy, -dot(gradient, step.descent), now.noise) > 0;
+    const double length = backtrack(moveTo, now.energy, -slope, now.noise);
     outcome.termination = Termination::kStalled;
-    if (!lower && step.fresh) break;
-    if (lower) now = std::move(next);
-    last = lower ? step.residual : 0;
+    if (length == 0 && fresh) break;
+    if (length > 0) {
+      now = std::move(next);
+      const Eigen::VectorXd before = std::exchange(gradient, gradientAt(now));
+      pairs_.add(-length * descent, gradient - before);
+      fresh = false;
+    }
+    usable = length > 0 && pace->keepsUp(outcome.residual);
   }
   path = now.path;
   return outcome;
-}
-
-ReducedPathNewton::Step ReducedPathNewton::stepFrom(const State& state, const std::vector<Eigen::VectorXd>& gradient,
-                                                    double last) {
-  const auto residual = [&](const std::vector<Eigen::VectorXd>& descent) {
-    return std::sqrt(std::max(dot(gradient, descent), 0.0) / std::max(state.energy, state.noise));
-  };
-  Step step;
-  if (last > 0) {
-    step.descent = factor_.solve(gradient);
-    step.residual = residual(step.descent);
-    step.found = step.residual <= std::max(options_.tolerance, kGoodStep * last);
-    if (step.found) return step;
-  }
-  step.found = step.fresh = factoriseAt(state);
-  if (!step.found) return step;
-  step.descent = factor_.solve(gradient);
-  step.residual = residual(step.descent);
-  return step;
 }
 
 }  // namespace shaped

@@ -3,6 +3,7 @@
 #include "core/curve/block_tridiagonal.h"
 #include "core/curve/curve.h"
 #include "core/curve/reduced_path.h"
+#include "core/numerics/secant_pairs.h"
 
 namespace shaped {
 
@@ -10,9 +11,10 @@ namespace shaped {
 /// on three diagonals and is exact, with a small multiple of one added; where that is not positive definite, each frame
 /// steps on its own, with elements that are.
 ///
-/// The factorised Hessian is kept: later steps, and the next path of as many frames, use it for as long as each step
-/// with it leaves at most a third of the residual. The residual is sqrt(g^T B g / energy), B the inverse Hessian in
-/// use. For one thread at a time; runs parallel loops in the current TBB arena. The space must outlive this.
+/// A Hessian takes as long as dozens of gradients. The factorised one is kept, by later steps and for the next path of
+/// as many frames, and brought up to date by SecantPairs, for as long as some such steps leave little of the residual.
+/// The residual is sqrt(g^T B g / energy), B the inverse Hessian in use. For one thread at a time; runs parallel loops
+/// in the current TBB arena. The space must outlive this.
 class ReducedPathNewton {
  public:
   ReducedPathNewton(const GhostSpace& space, double bending, const ReducedPathOptions& options)
@@ -28,16 +30,11 @@ class ReducedPathNewton {
     std::vector<ShellMeasures> measures;
     double energy = 0, noise = 0;  ///< (4) and its rounding error [m^2]
   };
-  struct Step {
-    bool found = false, fresh = false;     ///< fresh: by the Hessian of where the path is now
-    std::vector<Eigen::VectorXd> descent;  ///< to be subtracted from the inner frames
-    double residual = 0;
-  };
 
   State stateOf(PathCoordinates path) const;
-  std::vector<Eigen::VectorXd> gradientAt(const State& state) const;
-  /// With the kept factor where the last step, of such a residual, was a good one; 0: without it.
-  Step stepFrom(const State& state, const std::vector<Eigen::VectorXd>& gradient, double last);
+  State moved(const State& state, const Eigen::VectorXd& step) const;
+  /// Of the inner frames, one after the other.
+  Eigen::VectorXd gradientAt(const State& state) const;
   /// False where it cannot be made positive definite, or stopped.
   bool factoriseAt(const State& state);
   /// With as small a multiple of one as does it, at most `most` times the diagonal's mean.
@@ -46,14 +43,15 @@ class ReducedPathNewton {
   /// Of the Hessian: inner frame k with itself, and with the next.
   Eigen::MatrixXd diagonalBlock(const State& state, std::size_t k, HessianKind kind) const;
   Eigen::MatrixXd blockAbove(const State& state, std::size_t k) const;
-  /// Of a matrix on the ghost mesh by its products with the basis.
-  template <class Multiply>
-  Eigen::MatrixXd projected(const Multiply& multiply) const;
+
+  static constexpr std::size_t kPairs = 12;
 
   const GhostSpace& space_;
   PairEnergy energy_;
   ReducedPathOptions options_;
+  VectorBundle basis_;  ///< the space's
   BlockTridiagonalCholesky factor_;
+  SecantPairs pairs_{kPairs};
 };
 
 }  // namespace shaped

@@ -17,6 +17,18 @@ inline void addTransposedProduct(const double* b, const double* x, double* y) {
   y[2] += b[6] * x[0] + b[7] * x[1] + b[8] * x[2];
 }
 
+/// Three rows of y += B times three rows of x.
+inline void addProduct(const double* b, const VectorBundle& x, std::int32_t from, VectorBundle& y, std::int32_t to) {
+  for (int r = 0; r < 3; ++r)
+    y.row(3 * to + r) += b[r] * x.row(3 * from) + b[3 + r] * x.row(3 * from + 1) + b[6 + r] * x.row(3 * from + 2);
+}
+inline void addTransposedProduct(const double* b, const VectorBundle& x, std::int32_t from, VectorBundle& y,
+                                 std::int32_t to) {
+  for (int r = 0; r < 3; ++r)
+    y.row(3 * to + r) +=
+        b[3 * r] * x.row(3 * from) + b[3 * r + 1] * x.row(3 * from + 1) + b[3 * r + 2] * x.row(3 * from + 2);
+}
+
 using Triplets = std::vector<Eigen::Triplet<double>>;
 
 void appendBlock(const double* block, int row, int column, bool transposed, Triplets& triplets) {
@@ -55,6 +67,18 @@ void SymmetricBlockMatrix::multiplyAdd(const double* x, double* y) const {
   }
 }
 
+VectorBundle SymmetricBlockMatrix::operator*(const VectorBundle& x) const {
+  VectorBundle y = VectorBundle::Zero(x.rows(), x.cols());
+  const double* b = values_.data();
+  for (std::int32_t column = 0; column < pattern_->nodeCount(); ++column)
+    for (const auto row : pattern_->lowerRows(column)) {
+      addProduct(b, x, column, y, row);
+      if (row != column) addTransposedProduct(b, x, row, y, column);
+      b += 9;
+    }
+  return y;
+}
+
 Eigen::SparseMatrix<double> SymmetricBlockMatrix::toSparse() const {
   Triplets triplets;
   std::int32_t slot = 0;
@@ -80,6 +104,17 @@ void GeneralBlockMatrix::multiplyAdd(double scale, const double* x, double* y) c
       b += 9;
     }
   }
+}
+
+VectorBundle GeneralBlockMatrix::operator*(const VectorBundle& x) const {
+  VectorBundle y = VectorBundle::Zero(x.rows(), x.cols());
+  const double* b = values_.data();
+  for (std::int32_t column = 0; column < pattern_->nodeCount(); ++column)
+    for (const auto row : pattern_->rows(column)) {
+      addProduct(b, x, column, y, row);
+      b += 9;
+    }
+  return y;
 }
 
 void GeneralBlockMatrix::multiplyTransposedAdd(double scale, const double* x, double* y) const {

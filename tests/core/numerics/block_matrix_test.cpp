@@ -68,6 +68,8 @@ TEST_CASE("block matrices multiply and expand like the dense matrix with the sam
   Eigen::VectorXd y = start;
   blocks.multiplyAdd(x.data(), y.data());
   CHECK((y - start - symmetric * x).norm() < 1e-13);
+  const VectorBundle bundle = Eigen::MatrixXd::Random(3 * kNodes, 5);
+  CHECK((blocks * bundle - symmetric * bundle).norm() < 1e-12);
 
   const Eigen::MatrixXd general = randomGeneral(*pattern, random);
   REQUIRE((general - general.transpose()).norm() > 1);
@@ -76,6 +78,7 @@ TEST_CASE("block matrices multiply and expand like the dense matrix with the sam
   y = start;
   all.multiplyAdd(-1.5, x.data(), y.data());
   CHECK((y - start + 1.5 * general * x).norm() < 1e-13);
+  CHECK((all * bundle - general * bundle).norm() < 1e-12);
   y = start;
   all.multiplyTransposedAdd(0.5, x.data(), y.data());
   CHECK((y - start - 0.5 * general.transpose() * x).norm() < 1e-13);
