@@ -17,6 +17,8 @@ namespace shaped {
 namespace {
 
 constexpr std::size_t kRough = 5;  ///< frames of the paths by which the subspace is enriched
+/// Principal directions of the sides that are left out, of the largest singular value: what enrichments add is longer.
+constexpr double kNegligible = 1e-3;
 
 /// One geodesic of the construction as its ends move: the path at the latest t and at the one before.
 class MovingGeodesic {
@@ -27,7 +29,9 @@ class MovingGeodesic {
   /// Settles the path between these ends.
   Outcome moveTo(const Eigen::VectorXd& from, const Eigen::VectorXd& to) {
     auto next = now_;
-    if (!before_.empty())
+    if (!earlier_.empty())
+      for (std::size_t i = 0; i < next.size(); ++i) next[i] += 2 * now_[i] - 3 * before_[i] + earlier_[i];
+    else if (!before_.empty())
       for (std::size_t i = 0; i < next.size(); ++i) next[i] += now_[i] - before_[i];
     const Eigen::VectorXd first = from - next.front(), last = to - next.back();
     for (std::size_t i = 0; i < next.size(); ++i) {
@@ -38,7 +42,7 @@ class MovingGeodesic {
     next.back() = to;
     const auto outcome =
         options_.solver == PathSolver::kNewton ? newton_.settle(next) : settleByFlow(space_, bending_, next, options_);
-    before_ = std::exchange(now_, std::move(next));
+    earlier_ = std::exchange(before_, std::exchange(now_, std::move(next)));
     return outcome;
   }
   const PathCoordinates& path() const { return now_; }
@@ -48,7 +52,7 @@ class MovingGeodesic {
   double bending_;
   const ReducedPathOptions& options_;
   ReducedPathNewton newton_;
-  PathCoordinates now_, before_;
+  PathCoordinates now_, before_, earlier_;
 };
 
 /// De Casteljau's triangle within one subspace, for growing t.
@@ -117,6 +121,8 @@ class BezierRun {
       aligned_.push_back(apply(motion, control));
       stops_.push_back(inverse(motion));
     }
+    const CoarseningOptions coarse{options.geodesic.ghost_vertices, {}, options.geodesic.stop};
+    ghost_ = std::make_shared<const Coarsening>(coarsen(structure->topologyPtr(), aligned_, coarse));
   }
 
   Solved<BezierCurve> run() {
@@ -144,7 +150,8 @@ class BezierRun {
   /// The geodesics between neighbouring control shapes, at full resolution.
   std::vector<Curve> computeSides(Outcome& outcome) const {
     auto options = options_.geodesic;
-    options.frames = options_.auxiliary > 0 ? options_.auxiliary : options_.frames;
+    options.frames = options_.auxiliary;
+    options.ghost = ghost_;
     std::vector<Curve> sides;
     for (std::size_t i = 0; i + 1 < aligned_.size() && !cancelled(outcome); ++i) {
       auto side = geodesicByFlow(structure_, bending_, aligned_[i], aligned_[i + 1], options);
@@ -165,11 +172,10 @@ class BezierRun {
       for (const auto& frame : side.frames) frames.back().push_back(apply(alignRigidly(frame, origin), frame));
       all.insert(all.end(), frames.back().begin(), frames.back().end());
     }
-    auto subspace = principalSubspace(origin, all, options_.dimension);
+    auto subspace = principalSubspace(origin, all, options_.dimension, kNegligible);
     for (const auto& side : frames)
       for (const auto& end : {side.front(), side.back()}) subspace = including(subspace, end);
-    space_ = std::make_unique<GhostSpace>(structure_->topologyPtr(), std::move(subspace), aligned_,
-                                          options_.geodesic.ghost_vertices, options_.geodesic.stop);
+    space_ = std::make_unique<GhostSpace>(*ghost_, std::move(subspace));
     for (const auto& side : frames) {
       sides_.emplace_back();
       for (const auto& frame : side) sides_.back().push_back(space_->fine().coordinates(frame));
@@ -188,7 +194,7 @@ class BezierRun {
       std::vector<PathCoordinates> rough, inner;
       for (const auto& side : sides_) rough.push_back(resampled(*space_, bending_, side, kRough, settling_));
       Construction construction(*space_, bending_, settling_, rough);
-      for (const double t : {0.25, 0.5, 0.75}) {
+      for (const double t : {1. / 3, 2. / 3}) {
         outcome += construction.at(t);
         for (auto& path : construction.innerPaths()) inner.push_back(std::move(path));
         curve.geodesics += construction.geodesics();
@@ -243,6 +249,7 @@ class BezierRun {
   const ProgressSink& progress_;
   std::vector<Vertices> aligned_;   ///< the control shapes in the position of the first
   std::vector<RigidMotion> stops_;  ///< and back
+  std::shared_ptr<const Coarsening> ghost_;
   std::unique_ptr<GhostSpace> space_;
   std::vector<PathCoordinates> sides_;
 };
@@ -254,7 +261,7 @@ std::optional<std::string> BezierOptions::firstViolation() const {
     return std::string(name) + " = " + std::to_string(value) + ", want >= " + std::to_string(least);
   };
   if (frames < 2) return whole("frames", frames, 2);
-  if (auxiliary != 0 && auxiliary < 2) return whole("auxiliary", auxiliary, 2);
+  if (auxiliary < 2) return whole("auxiliary", auxiliary, 2);
   if (dimension < 1) return whole("dimension", dimension, 1);
   return geodesic.firstViolation();
 }

@@ -20,9 +20,9 @@ struct FlowTangents {
   double residual = 0;
 };
 
-/// The curve may be anywhere, but its frames must be aligned to each other. Stopped: some directions are missing. Runs
-/// a parallel loop in the current TBB arena, with a factorisation for each frame.
-FlowTangents flowTangents(const ShellStructurePtr& structure, double bending, const Curve& curve,
-                          const std::stop_token& stop = {});
+/// Of each curve. It may be anywhere, but its frames must be aligned to each other. Stopped: some directions are
+/// missing. Runs a parallel loop over all frames in the current TBB arena, with a factorisation for each.
+std::vector<FlowTangents> flowTangents(const ShellStructurePtr& structure, double bending,
+                                       const std::vector<Curve>& curves, const std::stop_token& stop = {});
 
 }  // namespace shaped

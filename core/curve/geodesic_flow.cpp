@@ -131,7 +131,9 @@ Solved<GeodesicFlow> geodesicByFlow(const ShellStructurePtr& structure, double b
   }
   PathCoordinates start;
   for (const auto& shape : rough) start.push_back(subspace.solution.coordinates(shape));
-  GhostSpace space(structure->topologyPtr(), std::move(subspace.solution), rough, options.ghost_vertices, options.stop);
+  GhostSpace space(options.ghost ? *options.ghost
+                                 : coarsen(structure->topologyPtr(), rough, {options.ghost_vertices, {}, options.stop}),
+                   std::move(subspace.solution));
   Refinement refinement(structure, space, bending, options);
   const auto path = refinement.run(std::move(start), progress);
   if (path.termination == Termination::kCancelled) return {std::move(result.solution), path};

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <memory>
 #include <optional>
 
 #include "core/curve/curve.h"
@@ -17,6 +18,8 @@ struct GeodesicFlowOptions {
   int enrichments = 2;                 ///< of the subspace at most, >= 0
   double accuracy = 1e-5;              ///< > 0; no more enrichments once GeodesicFlow::missing is below
   std::int32_t ghost_vertices = 1250;  ///< of the mesh on which energies are evaluated, >= 4
+  std::shared_ptr<const Coarsening> ghost =
+      {};  ///< that mesh, where there is one already; else it is made for the ends
   EnergySymmetry symmetry = EnergySymmetry::kSymmetric;  ///< of the flow's averages: (1), or (10) at half the cost
   PathSolver solver = PathSolver::kNewton;
   double tolerance = 1e-4;  ///< as ReducedPathOptions::tolerance

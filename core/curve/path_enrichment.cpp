@@ -35,16 +35,17 @@ bool PathEnrichment::worthAnother(const PathEnrichment& last) const {
 PathEnrichment enrich(const ShellStructurePtr& structure, double bending, GhostSpace& space,
                       const std::vector<PathCoordinates>& paths, double tolerance, const std::stop_token& stop) {
   PathEnrichment result;
-  std::vector<Eigen::VectorXd> displacements;
+  std::vector<Curve> curves;
   double displaced = 0, size = 0;
   for (const auto& path : paths) {
-    Curve curve{{}, false};
+    curves.push_back({{}, false});
     for (const auto& coordinates : path) {
-      curve.frames.push_back(space.fine().shape(coordinates));
-      const auto& shape = curve.frames.back();
+      const auto& shape = curves.back().frames.emplace_back(space.fine().shape(coordinates));
       size += (shape.rowwise() - shape.colwise().mean()).squaredNorm();
     }
-    const auto tangents = flowTangents(structure, bending, curve, stop);
+  }
+  std::vector<Eigen::VectorXd> displacements;
+  for (const auto& tangents : flowTangents(structure, bending, curves, stop)) {
     if (stop.stop_requested()) return result;
     result.residual = std::max(result.residual, tangents.residual);
     for (const auto& displacement : tangents.displacements) {

@@ -41,7 +41,8 @@ ReducedCurve::ReducedCurve(const TopologyPtr& topology, double bending, const Cu
   if (curve.size() < kCoarse) {
     // So few frames span too little of where they would go.
     const auto structure = std::make_shared<const ShellStructure>(topology);
-    for (const auto& direction : flowTangents(structure, bending, {aligned, curve.closed}, options.stop).directions)
+    const auto tangents = flowTangents(structure, bending, {{aligned, curve.closed}}, options.stop);
+    for (const auto& direction : tangents.front().directions)
       if (direction.size() > 0) subspace.append(direction);
   }
   space_ = std::make_unique<const GhostSpace>(topology, std::move(subspace), ghostShapes(curve, central),

@@ -4,8 +4,11 @@ namespace shaped {
 
 GhostSpace::GhostSpace(const TopologyPtr& topology, ShapeSubspace subspace, const std::vector<Vertices>& shapes,
                        std::int32_t vertices, const std::stop_token& stop)
+    : GhostSpace(coarsen(topology, shapes, {vertices, {}, stop}), std::move(subspace)) {}
+
+GhostSpace::GhostSpace(Coarsening ghost, ShapeSubspace subspace)
     : fine_(std::move(subspace)),
-      coarsening_(coarsen(topology, shapes, {vertices, {}, stop})),
+      coarsening_(std::move(ghost)),
       structure_(std::make_shared<const ShellStructure>(coarsening_.coarse)),
       origin_(restrict(fine_.origin)),
       basis_(origin_.size(), fine_.dimension()) {

@@ -15,6 +15,8 @@ class GhostSpace {
   /// own ghost. Throws as coarsen().
   GhostSpace(const TopologyPtr& topology, ShapeSubspace subspace, const std::vector<Vertices>& shapes,
              std::int32_t vertices, const std::stop_token& stop = {});
+  /// On a ghost mesh that is there already.
+  GhostSpace(Coarsening ghost, ShapeSubspace subspace);
 
   const ShapeSubspace& fine() const { return fine_; }
   Eigen::Index dimension() const { return fine_.dimension(); }

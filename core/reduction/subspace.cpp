@@ -47,7 +47,8 @@ Eigen::MatrixXd infinitesimalRigidMotions(const Vertices& shape) {
   return Eigen::HouseholderQR<Eigen::MatrixXd>(motions).householderQ() * Eigen::MatrixXd::Identity(shape.size(), 6);
 }
 
-ShapeSubspace principalSubspace(const Vertices& origin, const std::vector<Vertices>& shapes, int dimension) {
+ShapeSubspace principalSubspace(const Vertices& origin, const std::vector<Vertices>& shapes, int dimension,
+                                double negligible) {
   Eigen::MatrixXd displacements(origin.size(), static_cast<Eigen::Index>(shapes.size()));
   for (std::size_t i = 0; i < shapes.size(); ++i)
     displacements.col(static_cast<Eigen::Index>(i)) = flat(shapes[i]) - flat(origin);
@@ -57,7 +58,7 @@ ShapeSubspace principalSubspace(const Vertices& origin, const std::vector<Vertic
   const Eigen::VectorXd squares = gram.eigenvalues().reverse().cwiseMax(0);
   ShapeSubspace result{origin, Eigen::MatrixXd(origin.size(), 0)};
   const auto wanted = std::min<Eigen::Index>(dimension, squares.size());
-  for (Eigen::Index j = 0; j < wanted && squares[j] > kNegligible * kNegligible * squares[0]; ++j)
+  for (Eigen::Index j = 0; j < wanted && squares[j] > negligible * negligible * squares[0]; ++j)
     result.append(displacements * gram.eigenvectors().col(squares.size() - 1 - j));
   return result;
 }

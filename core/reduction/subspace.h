@@ -24,9 +24,10 @@ struct ShapeSubspace {
 Eigen::MatrixXd infinitesimalRigidMotions(const Vertices& shape);
 
 /// The `dimension` directions in which the shapes differ most from the origin: the left singular vectors of their
-/// displacements with the largest singular values ([BvTH16] section 6). Fewer where the displacements span fewer (to
-/// 1e-9 of the largest). The shapes should be aligned to the origin.
-ShapeSubspace principalSubspace(const Vertices& origin, const std::vector<Vertices>& shapes, int dimension);
+/// displacements with the largest singular values ([BvTH16] section 6). Fewer where the others are below `negligible`
+/// times the largest. The shapes should be aligned to the origin.
+ShapeSubspace principalSubspace(const Vertices& origin, const std::vector<Vertices>& shapes, int dimension,
+                                double negligible = 1e-9);
 
 /// The subspace and one direction more, with which it contains the shape: [BvTH16]'s missing vector. As it is when it
 /// contains the shape already (to 1e-9 of its displacement).

@@ -92,8 +92,8 @@ void bezier(const TopologySources& sources, const v1::BezierRequest& request,
     controls.push_back(shapeFromProto(request.controls(i), *topology, "controls[" + std::to_string(i) + "]"));
   BezierOptions options;
   options.frames = numberFromProto(request.frames(), kDefaultBezierFrames, kLeastFrames, kMostFrames, "frames");
-  options.auxiliary = numberFromProto(request.auxiliary_frames(), std::min(options.frames, kMostAuxiliary),
-                                      kLeastFrames, kMostAuxiliary, "auxiliary_frames");
+  options.auxiliary =
+      numberFromProto(request.auxiliary_frames(), options.auxiliary, kLeastFrames, kMostAuxiliary, "auxiliary_frames");
   options.geodesic = geodesicFromProto(request.options(), "options");
   options.geodesic.stop = call.stopToken();
   const std::int64_t held = options.frames + std::int64_t{options.auxiliary} * request.controls_size();

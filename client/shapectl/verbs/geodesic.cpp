@@ -58,7 +58,7 @@ struct Bezier {
 
   void declare(Arguments& arguments) {
     arguments.option("--frames", frames, "N", "Shapes to make, with both ends (32)");
-    arguments.option("--auxiliary-frames", auxiliary, "M", "Shapes of each geodesic of the construction (as --frames)");
+    arguments.option("--auxiliary-frames", auxiliary, "M", "Shapes of each geodesic of the construction (9)");
     arguments.option("-o,--out", out, "OUT.npy", "The frames, N x V x 3");
     arguments.required();
     flags.declare(arguments);

@@ -71,7 +71,7 @@ TEST_CASE("a Bezier curve of two shapes is their geodesic, of equal ones it stan
   const Fixture f;
   const Vertices a = f.shape(0, 1), b = f.shape(0.8, 1.2);
   BezierOptions options;
-  options.frames = 6;
+  options.frames = options.auxiliary = 6;
   const auto line = f.curve({a, b}, options);
   REQUIRE(line.converged());
   auto plain = options.geodesic;
