@@ -38,7 +38,8 @@ double relativeDifference(const Curve& curve, const Path& reference) {
 }
 
 /// What the full problem makes of a reduced geodesic: of it as it is, and with every inner vertex moved a little. Where
-/// only the first stays, the reduced one is a saddle of the full problem, which no gradient can tell.
+/// only the first stays, the reduced one is a saddle of the full problem or a shallow minimum, which no gradient can
+/// tell.
 void leave(Report& report, const GeodesicCalculus& calculus, const std::string& what, const Curve& reduced) {
   constexpr double shake = 1e-4;  // m
   const auto& frames = reduced.frames;
