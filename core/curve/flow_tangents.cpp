@@ -54,7 +54,9 @@ class TangentSolver {
       return factor_.factorise(hessian_, pins, stop_);
     };
     // Near a geodesic the Hessian itself is positive definite, and its step the better one.
-    if (!factorise(HessianKind::kExact) && !factorise(HessianKind::kProjected)) return result;
+    const bool usable =
+        factorise(HessianKind::kExact) || (!stop_.stop_requested() && factorise(HessianKind::kProjected));
+    if (!usable) return result;
     Eigen::VectorXd right = -(backward + forward);
     pins.clear(right.data());
     result.direction.resize(right.size());

@@ -8,7 +8,8 @@ namespace shaped {
 
 /// Which way each frame of a curve, but the ends of an open one, would go to lower the path energy (4): Newton's
 /// direction of its own coordinates at full resolution, without its rigid part; [BvTH16] (9) with the Hessian where the
-/// frame is instead of where its neighbours would be on it.
+/// frame is instead of where its neighbours would be on it; with elements that are not indefinite where the Hessian itself
+/// is not positive definite.
 struct FlowTangents {
   std::vector<Eigen::VectorXd> directions;  ///< 3V each; empty at the ends and where there is none
   /// Where the inner frames would be after a step of Newton's method for all of them, if the Hessian were the same

@@ -162,9 +162,7 @@ struct Submanifold::LocalProjection {
     addSecondCurvature(calculus.topology(), target, here, calculus.bending(), 1, measures);
     hessian.setZero();
     pullBackHessian(structure, q, measures, hessian);
-    Eigen::MatrixXd image = Eigen::MatrixXd::Zero(response.rows(), m);
-    for (Eigen::Index j = 0; j < m; ++j) hessian.multiplyAdd(response.col(j).data(), image.col(j).data());
-    curvature = response.transpose() * image;
+    curvature = response.transpose() * (hessian * response);
     curvature = 0.5 * (curvature + curvature.transpose()).eval();
   }
 

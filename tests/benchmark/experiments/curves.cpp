@@ -40,7 +40,7 @@ double relativeDifference(const Curve& curve, const Path& reference) {
 /// What the full problem makes of a reduced geodesic: of it as it is, and with every inner vertex moved a little. Where
 /// only the first stays, the reduced one is a saddle of the full problem or a shallow minimum, which no gradient can
 /// tell.
-void leave(Report& report, const GeodesicCalculus& calculus, const std::string& what, const Curve& reduced) {
+void stability(Report& report, const GeodesicCalculus& calculus, const std::string& what, const Curve& reduced) {
   constexpr double shake = 1e-4;  // m
   const auto& frames = reduced.frames;
   const int steps = static_cast<int>(frames.size()) - 1;
@@ -87,7 +87,7 @@ void compare(Report& report, const DataSet& set, std::size_t from, std::size_t t
       text("%+.4f %%; %.1e; %ld; %.0e; %.1f, %.1f", 100 * longer, difference, static_cast<long>(reduced.dimension),
            reduced.missing, seconds, full_seconds),
       "0.1 %; 1e-5", std::abs(longer) <= 1e-3 && difference <= 1e-5);
-  leave(report, calculus, text("%s %zu -> %zu, %d shapes", set.name.c_str(), from, to, frames), reduced.curve);
+  stability(report, calculus, text("%s %zu -> %zu, %d shapes", set.name.c_str(), from, to, frames), reduced.curve);
 }
 
 /// The norm of the difference of two curves after the best rigid fit of each pair of shapes, over the norm of the

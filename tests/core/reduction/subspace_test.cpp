@@ -35,6 +35,9 @@ TEST_CASE("a principal subspace is spanned by the left singular vectors of the d
   CHECK(orthonormality(subspace.basis) < 1e-13);
   const Eigen::MatrixXd cosines = svd.matrixU().leftCols(4).transpose() * subspace.basis;
   CHECK((cosines.cwiseAbs() - Eigen::MatrixXd::Identity(4, 4)).norm() < 1e-9);
+  const double second = svd.singularValues()[1] / svd.singularValues()[0];
+  CHECK(principalSubspace(origin, shapes, 4, 1.01 * second).dimension() == 1);
+  CHECK(principalSubspace(origin, shapes, 4, 0.99 * second).dimension() == 2);
 }
 
 TEST_CASE("a subspace of all displacements contains every shape, and has no more dimensions than they span") {
