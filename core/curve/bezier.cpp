@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <memory>
+#include <mutex>
 #include <utility>
 
 #include "core/curve/path_enrichment.h"
@@ -69,19 +70,23 @@ class Construction {
 
   /// The point at t.
   Solved<Eigen::VectorXd> at(double t) {
-    Solved<Eigen::VectorXd> result;
-    std::vector<Eigen::VectorXd> points;
-    for (const auto& side : sides_) points.push_back(pointAt(side, t, result));
+    Outcome outcome;
+    std::vector<Solved<Eigen::VectorXd>> points;
+    for (const auto& side : sides_) outcome += points.emplace_back(pointAt(side, t));
     for (std::size_t k = 0; points.size() > 1;) {
-      std::vector<Eigen::VectorXd> next;
-      for (std::size_t i = 0; i + 1 < points.size(); ++i, ++k) {
-        result += inner_[k].moveTo(points[i], points[i + 1]);
-        next.push_back(pointAt(inner_[k].path(), t, result));
-      }
+      std::vector<Solved<Eigen::VectorXd>> next(points.size() - 1);
+      tbb::parallel_for(std::size_t{0}, next.size(), [&](std::size_t i) {
+        auto& geodesic = inner_[k + i];
+        Outcome moved = geodesic.moveTo(points[i].solution, points[i + 1].solution);
+        next[i] = pointAt(geodesic.path(), t);
+        moved += next[i];
+        static_cast<Outcome&>(next[i]) = moved;
+      });
+      for (const auto& point : next) outcome += point;
+      k += next.size();
       points = std::move(next);
     }
-    result.solution = points.front();
-    return result;
+    return {std::move(points.front().solution), outcome};
   }
   std::vector<PathCoordinates> innerPaths() const {
     std::vector<PathCoordinates> paths;
@@ -91,10 +96,9 @@ class Construction {
   int geodesics() const { return static_cast<int>(inner_.size()); }
 
  private:
-  Eigen::VectorXd pointAt(const PathCoordinates& path, double t, Outcome& outcome) const {
+  Solved<Eigen::VectorXd> pointAt(const PathCoordinates& path, double t) const {
     auto point = pointOf(space_, bending_, path, t, options_);
-    outcome += Outcome{point.termination, 0, 0};
-    return std::move(point.solution);
+    return {std::move(point.solution), {point.termination, 0, 0}};
   }
 
   const GhostSpace& space_;
@@ -152,13 +156,22 @@ class BezierRun {
     auto options = options_.geodesic;
     options.frames = options_.auxiliary;
     options.ghost = ghost_;
+    const std::size_t count = aligned_.size() - 1;
+    std::vector<Solved<GeodesicFlow>> solved(count);
+    std::size_t done = 0;
+    std::mutex telling;
+    // Much of a geodesic is one thing after the other: so many of them keep the other threads busy.
+    tbb::parallel_for(std::size_t{0}, count, [&](std::size_t i) {
+      solved[i] = geodesicByFlow(structure_, bending_, aligned_[i], aligned_[i + 1], options);
+      const std::lock_guard lock(telling);
+      ++done;
+      tell(std::to_string(done) + " of " + std::to_string(count) + " sides",
+           kSides * static_cast<double>(done) / static_cast<double>(count), solved[i]);
+    });
     std::vector<Curve> sides;
-    for (std::size_t i = 0; i + 1 < aligned_.size() && !cancelled(outcome); ++i) {
-      auto side = geodesicByFlow(structure_, bending_, aligned_[i], aligned_[i + 1], options);
+    for (auto& side : solved) {
       outcome += side;
       sides.push_back(std::move(side.solution.curve));
-      tell("side " + std::to_string(i + 1), kSides * static_cast<double>(i + 1) / static_cast<double>(aligned_.size()),
-           outcome);
     }
     return sides;
   }
