@@ -1,8 +1,9 @@
 """Clean and noisy motions for row 8 of the table on curves: noisy_clips.py DATA DEST [CLIP...]
 
 Skins a body of body_sequences by its own joint rotations, and again with noise that differs from frame to frame: `pose`, each joint
-turned by a random rotation of 1 degree (standard deviation of each axis); `vertex`, each vertex displaced by 1 mm (each axis); `both`.
-Writes DEST/CLIP_{clean,pose,vertex,both}.npy (frames, 1250, 3) and the mesh DEST/CLIP.ply. CLIP: run_muscular, walk_child and sword_muscular unless given.
+turned by a random rotation of 1 degree (standard deviation of each axis); `vertex`, each vertex displaced by 1 mm (each axis); `surface`,
+a field of displacements that is smooth over some 5 cm of the surface, 3 mm (each axis), as frames captured one by one have it; `captured`,
+pose and surface. Writes DEST/CLIP_{clean,pose,vertex,surface,captured}.npy (frames, 1250, 3) and the mesh DEST/CLIP.ply. CLIP: run_muscular, walk_child and sword_muscular unless given.
 """
 
 import json
@@ -46,6 +47,25 @@ def read_vertices(path, count):
     return numpy.frombuffer(data, "<f4", 3 * count, start).reshape(count, 3).astype(float)
 
 
+def read_faces(path, vertices):
+    data = path.read_bytes()
+    start = data.index(b"end_header\n") + len(b"end_header\n") + 12 * vertices
+    rows = numpy.frombuffer(data, numpy.dtype([("count", "u1"), ("corners", "<i4", 3)]), offset=start)
+    return rows["corners"]
+
+
+def smooth_fields(rest, faces, length, count, random):
+    """Random fields (count, V, 3) that vary over `length` metres of the surface, of unit variance at each vertex."""
+    edges = numpy.unique(numpy.sort(numpy.concatenate([faces[:, [0, 1]], faces[:, [1, 2]], faces[:, [2, 0]]]), axis=1), axis=0)
+    near = numpy.zeros((len(rest), len(rest)))
+    weights = length ** 2 / (4 * ((rest[edges[:, 0]] - rest[edges[:, 1]]) ** 2).sum(-1))
+    near[edges[:, 0], edges[:, 1]] = near[edges[:, 1], edges[:, 0]] = weights
+    spread = numpy.linalg.inv(numpy.diag(1 + near.sum(1)) - near)
+    spread = spread @ spread
+    spread /= numpy.linalg.norm(spread, axis=1, keepdims=True)
+    return numpy.einsum("vw,fwa->fva", spread, random.standard_normal((count, *rest.shape)))
+
+
 def main(data, dest, clips):
     data, dest = pathlib.Path(data), pathlib.Path(dest)
     dest.mkdir(parents=True, exist_ok=True)
@@ -57,7 +77,8 @@ def main(data, dest, clips):
     weights = whole[index]
     for clip in clips:
         name, body = clip.rsplit("_", 1)
-        rest = read_vertices(data / f"body_sequences/rest_1k_{body}.ply", len(index))
+        mesh = data / f"body_sequences/rest_1k_{body}.ply"
+        rest = read_vertices(mesh, len(index))
         joints = numpy.array(hierarchy["identities"][body]["rest_joint_positions_m"])
         vectors = numpy.load(data / f"body_sequences/motion_{name}_{body}_rotvec_f32.npy").astype(float)
         random = numpy.random.default_rng(7)
@@ -65,14 +86,16 @@ def main(data, dest, clips):
         noise = rotations(numpy.radians(1) * random.standard_normal(vectors.shape))
         noise[:, 0] = numpy.eye(3)  # the root's rotation changes no shape
         shake = 0.001 * random.standard_normal((len(vectors), *rest.shape))
+        surface = 0.003 * smooth_fields(rest, read_faces(mesh, len(rest)), 0.05, len(vectors), random)
         clean = skinned(rest, weights, joints, hierarchy["parents"], clean_turns)
         posed = skinned(rest, weights, joints, hierarchy["parents"], clean_turns @ noise)
         truth = numpy.load(data / f"body_sequences/seq_{clip}_1k_f32.npy")
         print(f"{clip}: {len(clean)} frames; the skinning differs from the data by {abs(clean - truth).max() * 1000:.2f} mm; noise"
-              f" [mm RMS]: pose {rms(posed - clean):.1f}, vertex {rms(shake):.1f}")
-        for kind, frames in (("clean", clean), ("pose", posed), ("vertex", clean + shake), ("both", posed + shake)):
+              f" [mm RMS]: pose {rms(posed - clean):.1f}, vertex {rms(shake):.1f}, surface {rms(surface):.1f}")
+        for kind, frames in (("clean", clean), ("pose", posed), ("vertex", clean + shake), ("surface", clean + surface),
+                             ("captured", posed + surface)):
             numpy.save(dest / f"{clip}_{kind}.npy", frames.astype(numpy.float32))
-        shutil.copy(data / f"body_sequences/rest_1k_{body}.ply", dest / f"{clip}.ply")
+        shutil.copy(mesh, dest / f"{clip}.ply")
 
 
 def rms(difference):

@@ -139,12 +139,17 @@ std::vector<Quality> bilaterals(const Judge& judge, const Curve& noisy) {
 
 using Measure = double Quality::*;
 
-/// The flow that is furthest ahead of the best bilateral filter that is at least as smooth.
+bool keepsSize(const Quality& quality) { return quality.volume <= 0.01 && quality.limbs <= 0.01; }
+
+/// The flow that is furthest ahead of the best bilateral filter that is at least as smooth: one that keeps volume and
+/// limbs, where there is one.
 void compareAtEqual(Report& report, const std::string& title, const std::vector<Quality>& ours,
                     const std::vector<Quality>& theirs, Measure error, Measure smoothness) {
   const Quality *best = nullptr, *rival = nullptr;
   double ratio = 0;
+  const bool any = std::any_of(ours.begin(), ours.end(), keepsSize);
   for (const auto& flow : ours) {
+    if (any && !keepsSize(flow)) continue;
     const Quality* equal = nullptr;
     for (const auto& other : theirs)
       if (other.*smoothness <= flow.*smoothness && (equal == nullptr || other.*error < equal->*error)) equal = &other;
@@ -155,7 +160,7 @@ void compareAtEqual(Report& report, const std::string& title, const std::vector<
   }
   if (best == nullptr) return report.entry(title, "no bilateral filter is as smooth");
   report.entry(title, text("%.2f; ", ratio) + told(*best) + "; " + told(*rival), ">= 2; <= 1 %",
-               ratio >= 2 && best->volume <= 0.01 && best->limbs <= 0.01);
+               ratio >= 2 && keepsSize(*best));
 }
 
 void denoise(Report& report, const std::string& clip, const std::string& kind) {
@@ -185,7 +190,7 @@ void denoise(Report& report, const std::string& clip, const std::string& kind) {
 void denoising() {
   Report report("Denoising");
   for (const char* clip : {"run_muscular", "walk_child", "sword_muscular"})
-    for (const char* kind : {"pose", "vertex", "both"}) denoise(report, clip, kind);
+    for (const char* kind : {"pose", "vertex", "surface", "captured"}) denoise(report, clip, kind);
 }
 
 }  // namespace shaped::experiments
