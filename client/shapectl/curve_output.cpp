@@ -123,4 +123,20 @@ std::string gradientPlot(const v1::SmoothSummary& summary, const std::string& ti
                   .series = {series("before", summary.gradient_before()), series("after", summary.gradient_after())}});
 }
 
+std::string energyPlot(const v1::SmoothSummary& summary, const std::string& title) {
+  if (summary.step_energies().empty())
+    throw InvalidInput("--plot-energy", "is for clips that one window sees, this one took " +
+                                            std::to_string(summary.windows()) + " (--window makes it larger)");
+  if (!(largest(summary.step_energies()) > 0))
+    throw InvalidInput("--plot-energy", "has nothing to draw: the clip does not move");
+  PlotSeries energies{"", {}, {}};
+  for (int k = 0; k < summary.step_energies_size(); ++k) {
+    energies.x.push_back(k);
+    energies.y.push_back(summary.step_energies(k));
+  }
+  LinePlot plot{.title = title, .x_label = "steps", .y_label = "path energy [m^2]", .series = {std::move(energies)}};
+  plot.y_logarithmic = true;
+  return svgPlot(plot);
+}
+
 }  // namespace shaped::shapectl

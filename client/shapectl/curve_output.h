@@ -45,4 +45,8 @@ void printGeodesic(const v1::GeodesicSummary& summary, const std::string& out, c
 /// The gradient's norm at each frame before and after, as SVG ([BvTH16] Fig. 7).
 std::string gradientPlot(const v1::SmoothSummary& summary, const std::string& title);
 
+/// The path energy after each step, as SVG with a logarithmic axis ([BvTH16] Fig. 9). Throws InvalidInput naming the
+/// option when there is nothing to draw: several windows saw the clip, or it never moves.
+std::string energyPlot(const v1::SmoothSummary& summary, const std::string& title);
+
 }  // namespace shaped::shapectl

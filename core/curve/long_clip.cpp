@@ -18,8 +18,10 @@ struct Window {
   std::int64_t from, to;    ///< that it answers for; the last ones blended with the next window
 };
 
-std::vector<Window> windowsOf(std::int64_t frames, std::int64_t size, std::int64_t blend, std::int64_t reach) {
-  if (frames <= size) return {{0, frames, 0, frames}};
+std::vector<Window> windowsOf(std::int64_t frames, const LongClipOptions& options) {
+  const auto size = options.window, blend = options.blend,
+             reach = flowReach(options.smoothing.steps, options.smoothing.flow.tau);
+  if (frames <= size || options.closed) return {{0, frames, 0, frames}};
   const std::int64_t own = std::max<std::int64_t>(size - 2 * reach - blend, blend + 1);
   std::vector<Window> windows;
   for (std::int64_t from = 0; from < frames; from += own) {
@@ -41,17 +43,18 @@ std::vector<Value> part(const std::vector<Value>& values, const Window& window) 
 class LongClip {
  public:
   LongClip(const ShellStructurePtr& structure, double bending, const FrameSource& source,
-           const LongClipOptions& options, const FrameSink& sink)
+           const LongClipOptions& options, bool whole, const FrameSink& sink)
       : structure_(structure),
         bending_(bending),
         source_(source),
         options_(options),
+        whole_(whole),
         sink_(sink),
         before_(structure->topologyPtr(), bending),
         after_(structure->topologyPtr(), bending) {}
 
   Outcome smooth(const Window& window, LongClipReport& report, const ProgressSink& progress) {
-    Curve curve{{}, false};
+    Curve curve{{}, options_.closed};
     for (auto i = window.begin; i < window.end; ++i) {
       curve.frames.push_back(source_.frame(i));
       requireValidShape(structure_->topology(), curve.frames.back(), "frames[" + std::to_string(i) + "]");
@@ -66,16 +69,15 @@ class LongClip {
                                        : std::min(report.steps, static_cast<int>(smooth.steps.size()));
     report.dimension = smooth.dimension;
     report.stationary = report.stationary && smooth.stationary;
-    report.step_energies.clear();
-    if (report.windows == 0)
-      for (const auto& step : smooth.steps) report.step_energies.push_back(step.path_energy);
     ++report.windows;
+    if (whole_) tellOf(smooth, report);
     handOn(window, curve, smooth.curve);
     return result;
   }
 
   void measureWhole(LongClipReport& report) const {
     report.smallest_area_ratio = smallest_area_ratio_;
+    if (whole_) return;  // its window has measured it
     report.path_energy_before = before_.pathEnergy();
     report.path_energy_after = after_.pathEnergy();
     report.gradient_before = before_.gradientNorms();
@@ -83,6 +85,15 @@ class LongClip {
   }
 
  private:
+  static void tellOf(const Smoothed& smooth, LongClipReport& report) {
+    report.path_energy_before = smooth.path_energy_before;
+    report.path_energy_after = smooth.path_energy_after;
+    report.gradient_before = smooth.gradient_before;
+    report.gradient_after = smooth.gradient_after;
+    report.step_energies.push_back(smooth.flow_energy_before);
+    for (const auto& step : smooth.steps) report.step_energies.push_back(step.path_energy);
+  }
+
   void handOn(const Window& window, const Curve& original, const Curve& smooth) {
     const auto blend = static_cast<std::int64_t>(pending_.size());
     const bool last = window.to == source_.frames;
@@ -104,8 +115,10 @@ class LongClip {
   }
 
   void deliver(std::int64_t index, const Vertices& original, const Vertices& frame) {
-    before_.add(original);
-    after_.add(frame);
+    if (!whole_) {
+      before_.add(original);
+      after_.add(frame);
+    }
     const auto& faces = structure_->topology().faces();
     smallest_area_ratio_ = std::min(smallest_area_ratio_, smallestAreaRatio(faces, original, frame));
     sink_(index, frame);
@@ -115,6 +128,7 @@ class LongClip {
   double bending_;
   const FrameSource& source_;
   const LongClipOptions& options_;
+  bool whole_;  ///< one window sees the clip
   const FrameSink& sink_;
   std::vector<Vertices> pending_;  ///< the last window's answers that the next one's are blended with
   CurveMeter before_, after_;
@@ -136,13 +150,10 @@ std::optional<std::string> LongClipOptions::firstViolation(std::int64_t frames) 
 Solved<LongClipReport> smoothLongClip(const ShellStructurePtr& structure, double bending, const FrameSource& source,
                                       const LongClipOptions& options, const FrameSink& sink,
                                       const ProgressSink& progress) {
-  if (source.frames < 2)
-    throw InvalidInput("frames", "has " + std::to_string(source.frames) + " frames, an open curve needs at least 2");
   if (const auto violation = options.firstViolation(source.frames)) throw InvalidInput("options", *violation);
-  const auto windows = windowsOf(source.frames, options.window, options.blend,
-                                 flowReach(options.smoothing.steps, options.smoothing.flow.tau));
+  const auto windows = windowsOf(source.frames, options);
   Solved<LongClipReport> result;
-  LongClip clip(structure, bending, source, options, sink);
+  LongClip clip(structure, bending, source, options, windows.size() == 1, sink);
   for (std::size_t k = 0; k < windows.size(); ++k) {
     const auto within = [&](const Progress& step) {
       progress(

@@ -20,7 +20,8 @@ struct LongClipOptions {
   std::int64_t window = 160;  ///< frames that are smoothed at once, >= 8; a clip with no more is smoothed whole
   /// In which both windows' answers are blended, >= 1.
   std::int64_t blend = 4;
-  SmoothingOptions smoothing;  ///< restore and held: of all frames, or empty; an open curve
+  bool closed = false;         ///< the first frame follows the last; such a clip is smoothed whole
+  SmoothingOptions smoothing;  ///< restore and held: of all frames, or empty
 
   std::optional<std::string> firstViolation(std::int64_t frames) const;
 };
@@ -30,10 +31,11 @@ struct LongClipReport {
   int steps = 0;               ///< the fewest that a window took
   Eigen::Index dimension = 0;  ///< of the last window's subspace; 0: full resolution
   bool stationary = true;
-  double smallest_area_ratio = 1;  ///< over all frames, against the frame as it came
+  double smallest_area_ratio = 1;                        ///< over all frames, against the frame as it came
   double path_energy_before = 0, path_energy_after = 0;  ///< (4) of the whole clip [m^2]
   std::vector<double> gradient_before, gradient_after;   ///< gradientNorms() of the whole clip
-  /// (4) after each step where one window saw the clip, on the mesh that the flow ran on; else empty [m^2].
+  /// (4) before the first step and after each one where one window saw the clip, on the mesh that the flow ran on; else
+  /// empty [m^2].
   std::vector<double> step_energies;
 };
 
@@ -42,7 +44,7 @@ struct LongClipReport {
 /// since a step couples neighbours alone.
 std::int64_t flowReach(int steps, double tau);
 
-/// Smooths an open clip in overlapping windows, so that memory does not grow with its length. Each window brings
+/// Smooths a clip, an open one in overlapping windows, so that memory does not grow with its length. Each window brings
 /// flowReach() frames more on either side, so that what its ends hold does not reach the frames it answers for; around
 /// the border of two windows, whose subspaces differ, the answer passes from one to the other.
 ///

@@ -12,6 +12,7 @@ namespace {
 /// Takes the steps; false where the caller stopped them.
 Outcome run(SmoothingFlow& flow, const SmoothingOptions& options, Smoothed& result, const ProgressSink& progress) {
   Outcome outcome;
+  result.flow_energy_before = flow.pathEnergy();
   for (int k = 0; k < options.steps; ++k) {
     const auto step = flow.step();
     outcome.iterations += step.iterations;

@@ -18,6 +18,7 @@ struct SmoothingOptions {
 struct Smoothed {
   Curve curve;
   std::vector<SmoothingStep> steps;                      ///< that were taken
+  double flow_energy_before = 0;                         ///< path energy before the first of them [m^2]
   Eigen::Index dimension = 0;                            ///< of the subspace that all frames share; 0: full resolution
   bool stationary = false;                               ///< nothing more to gain; fewer steps than asked for, then
   double path_energy_before = 0, path_energy_after = 0;  ///< (4) of the curve as it came and as it is [m^2]
@@ -25,7 +26,7 @@ struct Smoothed {
 };
 
 /// Smooths a curve by steps of the flow ([BvTH16] (2)). Both numbers and gradients are of the mesh itself, also where
-/// the flow ran on a ghost mesh; those of the steps are of the mesh that it ran on.
+/// the flow ran on a ghost mesh; those of the steps and flow_energy_before are of the mesh that it ran on.
 ///
 /// Cancelled: the curve after the steps so far. Stalled or numerical failure: no step could be taken any more though
 /// the curve is not stationary, as SmoothingFlow::step. Throws as ReducedCurve or SmoothingFlow. progress: after each

@@ -50,18 +50,23 @@ std::string textElement(double x, double y, const std::string& text, const char*
 struct Axis {
   std::vector<double> ticks;
   double pixel_low, pixel_high;
+  bool logarithmic = false;
 
   double pixel(double value) const {
-    return pixel_low + (value - ticks.front()) / (ticks.back() - ticks.front()) * (pixel_high - pixel_low);
+    const double low = scaled(ticks.front()), high = scaled(ticks.back());
+    return pixel_low + (scaled(value) - low) / (high - low) * (pixel_high - pixel_low);
   }
+
+ private:
+  double scaled(double value) const { return logarithmic ? std::log10(value) : value; }
 };
 
 struct Frame {
   Axis x, y;
 };
 
-bool finitePoint(const PlotSeries& series, std::size_t i) {
-  return std::isfinite(series.x[i]) && std::isfinite(series.y[i]);
+bool drawable(const LinePlot& plot, const PlotSeries& series, std::size_t i) {
+  return std::isfinite(series.x[i]) && std::isfinite(series.y[i]) && (!plot.y_logarithmic || series.y[i] > 0);
 }
 
 void requirePlot(const LinePlot& plot) {
@@ -75,8 +80,10 @@ void requirePlot(const LinePlot& plot) {
       throw InvalidInput(field, "has " + std::to_string(series.x.size()) + " x and " + std::to_string(series.y.size()) +
                                     " y values, want as many");
     bool any = false;
-    for (std::size_t i = 0; i < series.x.size(); ++i) any = any || finitePoint(series, i);
-    if (!any) throw InvalidInput(field, "has no point with finite coordinates");
+    for (std::size_t i = 0; i < series.x.size(); ++i) any = any || drawable(plot, series, i);
+    if (!any)
+      throw InvalidInput(field, std::string("has no point with ") + (plot.y_logarithmic ? "positive y and " : "") +
+                                    "finite coordinates");
   }
 }
 
@@ -87,17 +94,18 @@ std::size_t namedCount(const LinePlot& plot) {
 
 Frame frameOf(const LinePlot& plot) {
   constexpr double infinity = std::numeric_limits<double>::infinity();
-  double x_low = infinity, x_high = -infinity, y_low = plot.y_from_zero ? 0 : infinity, y_high = -infinity;
+  double x_low = infinity, x_high = -infinity, y_low = infinity, y_high = -infinity;
   for (const auto& series : plot.series)
     for (std::size_t i = 0; i < series.x.size(); ++i) {
-      if (!finitePoint(series, i)) continue;
+      if (!drawable(plot, series, i)) continue;
       x_low = std::min(x_low, series.x[i]), x_high = std::max(x_high, series.x[i]);
       y_low = std::min(y_low, series.y[i]), y_high = std::max(y_high, series.y[i]);
     }
-  if (plot.y_from_zero) y_high = std::max(y_high, 0.0);
+  if (plot.y_from_zero && !plot.y_logarithmic) y_low = std::min(y_low, 0.0), y_high = std::max(y_high, 0.0);
   const double top = (plot.title.empty() ? 20 : 44) + (namedCount(plot) > 1 ? kLegendRow + 6 : 0);
   return {{roundTicks(x_low, x_high, 8), kLeft, plot.width - kRight},
-          {roundTicks(y_low, y_high), plot.height - kBottom, top}};
+          {plot.y_logarithmic ? decadeTicks(y_low, y_high) : roundTicks(y_low, y_high), plot.height - kBottom, top,
+           plot.y_logarithmic}};
 }
 
 std::string axes(const LinePlot& plot, const Frame& frame) {
@@ -124,18 +132,18 @@ std::string axes(const LinePlot& plot, const Frame& frame) {
   return svg;
 }
 
-std::string line(const PlotSeries& series, const Frame& frame, const char* stroke) {
+std::string line(const LinePlot& plot, const PlotSeries& series, const Frame& frame, const char* stroke) {
   std::string path, dots;
   bool drawing = false;
   for (std::size_t i = 0; i < series.x.size(); ++i) {
-    const bool finite = finitePoint(series, i);
-    if (finite) {
+    const bool drawn = drawable(plot, series, i);
+    if (drawn) {
       const double x = frame.x.pixel(series.x[i]), y = frame.y.pixel(series.y[i]);
       path += format("%s%.2f,%.2f ", drawing ? "L" : "M", x, y);
       if (series.x.size() <= 60)
         dots += format("<circle cx=\"%.2f\" cy=\"%.2f\" r=\"3.2\" fill=\"%s\"/>\n", x, y, stroke);
     }
-    drawing = finite;
+    drawing = drawn;
   }
   return format("<path d=\"%s\" fill=\"none\" stroke=\"%s\" stroke-width=\"2\" stroke-linejoin=\"round\"/>\n",
                 path.c_str(), stroke) +
@@ -176,6 +184,15 @@ std::vector<double> roundTicks(double low, double high, int count) {
   return ticks;
 }
 
+std::vector<double> decadeTicks(double low, double high, int count) {
+  const int first = static_cast<int>(std::floor(std::log10(low) + 1e-9));
+  const int last = std::max(static_cast<int>(std::ceil(std::log10(high) - 1e-9)), first + 1);
+  const int step = (last - first + count - 1) / count;
+  std::vector<double> ticks;
+  for (int power = first; power < last + step; power += step) ticks.push_back(std::pow(10.0, power));
+  return ticks;
+}
+
 std::string svgPlot(const LinePlot& plot) {
   requirePlot(plot);
   const Frame frame = frameOf(plot);
@@ -185,7 +202,7 @@ std::string svgPlot(const LinePlot& plot) {
       "<rect width=\"100%%\" height=\"100%%\" fill=\"white\"/>\n",
       plot.width, plot.height, plot.width, plot.height);
   svg += axes(plot, frame);
-  for (std::size_t s = 0; s < plot.series.size(); ++s) svg += line(plot.series[s], frame, color(s));
+  for (std::size_t s = 0; s < plot.series.size(); ++s) svg += line(plot, plot.series[s], frame, color(s));
   return svg + legend(plot, frame) + "</svg>\n";
 }
 

@@ -19,6 +19,7 @@ constexpr int kMostClips = 32, kMostTransition = 1000, kMostReach = 10'000;
 LongClipOptions optionsFrom(const v1::SmoothRequest& request, const DatasetFrames& frames, const Limits& limits,
                             std::stop_token stop) {
   LongClipOptions options;
+  options.closed = request.closed();
   const auto vertices = frames.topology()->vertexCount();
   options.smoothing = smoothingFromProto(request.flow(), vertices, kDefaultSmoothingSteps, "flow");
   options.smoothing.flow.stop = std::move(stop);
@@ -29,39 +30,10 @@ LongClipOptions optionsFrom(const v1::SmoothRequest& request, const DatasetFrame
   // Many steps reach so far that a window sees more frames than it was asked to have.
   const auto reach = flowReach(options.smoothing.steps, options.smoothing.flow.tau);
   const auto seen = std::max(options.window, 2 * (reach + options.blend) + 1);
-  const bool whole = request.closed() || frames.count() <= options.window;
+  const bool whole = options.closed || frames.count() <= options.window;
   requireCurveFits(whole ? frames.count() : std::min(seen, frames.count()), vertices, limits,
                    whole ? "dataset" : "window");
   return options;
-}
-
-/// A closed curve has no windows.
-Solved<LongClipReport> smoothClosed(const ShellStructurePtr& structure, double bending, const FrameSource& source,
-                                    const SmoothingOptions& options, const FrameSink& sink,
-                                    const ProgressSink& progress) {
-  Curve curve{{}, true};
-  for (std::int64_t i = 0; i < source.frames; ++i) curve.frames.push_back(source.frame(i));
-  auto solved = smoothed(structure, bending, curve, options, progress);
-  Solved<LongClipReport> result({}, solved);
-  if (solved.termination == Termination::kCancelled) return result;
-  auto& report = result.solution;
-  auto& smooth = solved.solution;
-  report.windows = 1;
-  report.steps = static_cast<int>(smooth.steps.size());
-  report.dimension = smooth.dimension;
-  report.stationary = smooth.stationary;
-  report.path_energy_before = smooth.path_energy_before;
-  report.path_energy_after = smooth.path_energy_after;
-  report.gradient_before = std::move(smooth.gradient_before);
-  report.gradient_after = std::move(smooth.gradient_after);
-  for (const auto& step : smooth.steps) report.step_energies.push_back(step.path_energy);
-  for (std::size_t i = 0; i < curve.size(); ++i) {
-    const auto& frame = smooth.curve.frames[i];
-    report.smallest_area_ratio =
-        std::min(report.smallest_area_ratio, smallestAreaRatio(structure->topology().faces(), curve.frames[i], frame));
-    sink(static_cast<std::int64_t>(i), frame);
-  }
-  return result;
 }
 
 /// All frames of the clips, which must have one connectivity.
@@ -121,9 +93,7 @@ void smooth(const DatasetStore& datasets, const Limits& limits, const v1::Smooth
   CurveStream<v1::SmoothResponse> stream(write, *frames.topology());
   const FrameSource source{frames.count(), [&](std::int64_t i) { return frames.frame(i); }};
   const auto sink = [&](std::int64_t i, const Vertices& frame) { stream.frame(i, frame); };
-  const auto solved = request.closed()
-                          ? smoothClosed(structure, bending, source, options.smoothing, sink, stream.progress())
-                          : smoothLongClip(structure, bending, source, options, sink, stream.progress());
+  const auto solved = smoothLongClip(structure, bending, source, options, sink, stream.progress());
   countCurve(solved, call);
   stream.summary([&](v1::SmoothSummary& summary) {
     toProto(solved, call.workSeconds(), *summary.mutable_report());

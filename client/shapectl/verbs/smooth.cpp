@@ -10,7 +10,7 @@ namespace shaped::shapectl {
 namespace {
 
 struct Smooth {
-  std::string in, template_file, out, plot;
+  std::string in, template_file, out, plot, energy_plot;
   std::vector<std::string> held;
   double restore = 0, bending = 0;
   std::int64_t window = 0;
@@ -29,6 +29,7 @@ struct Smooth {
     arguments.option("--window", window, "N", "Frames that are smoothed at once (160)");
     arguments.option("--bending", bending, "ETA", "Bending weight [m^2] (2.5e-5 times the squared diameter)");
     arguments.option("--plot", plot, "P.svg", "Draw how sharp the motion's corner is at each frame, before and after");
+    arguments.option("--plot-energy", energy_plot, "P.svg", "Draw the path energy over the steps");
   }
 
   ExitCode run(const Session& session) const {
@@ -39,8 +40,9 @@ struct Smooth {
     const auto stub = v1::Curves::NewStub(session.channel());
     const auto stream = stub->Smooth(call.context(), request);
     const auto summary = receiveCurve(*stream, out);
-    if (!plot.empty()) writeFile(plot, gradientPlot(summary, in));
     printSmoothing(summary, {}, out, session);
+    if (!plot.empty()) writeFile(plot, gradientPlot(summary, in));
+    if (!energy_plot.empty()) writeFile(energy_plot, energyPlot(summary, in));
     return exitCodeOf(summary.report());
   }
 

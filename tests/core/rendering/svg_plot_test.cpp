@@ -58,6 +58,28 @@ TEST_CASE("a missing value breaks the line") {
   CHECK(occurrences(svg, "nan") == 0);
 }
 
+TEST_CASE("a logarithmic axis has powers of ten, equally far") {
+  CHECK(decadeTicks(0.02, 30) == std::vector<double>{0.01, 0.1, 1, 10, 100});
+  CHECK(decadeTicks(1, 1) == std::vector<double>{1, 10});
+  const auto many = decadeTicks(1e-12, 2, 8);
+  CHECK(many.size() <= 9);
+  CHECK(many.front() == Approx(1e-12));
+  CHECK(many.back() >= 2);
+  LinePlot plot{"", "x", "y", {{"", {1, 2, 3, 4}, {1, 0.1, 0, 0.01}}}};
+  plot.y_logarithmic = true;
+  const auto svg = svgPlot(plot);
+  CHECK(occurrences(svg, "<circle") == 3);
+  CHECK(occurrences(svg, "M") == 2);  // broken where the value is 0
+  double first = 0, second = 0;
+  const auto at = svg.find("<circle"), next = svg.find("<circle", at + 1);
+  REQUIRE(std::sscanf(svg.c_str() + at, "<circle cx=\"%*f\" cy=\"%lf", &first) == 1);
+  REQUIRE(std::sscanf(svg.c_str() + next, "<circle cx=\"%*f\" cy=\"%lf", &second) == 1);
+  CHECK(first == Approx(20));
+  CHECK(second == Approx(20 + 362 / 2.0));
+  plot.series[0].y = {0, -1, 0, 0};
+  CHECK_THROWS_WITH(svgPlot(plot), Catch::Contains("series[0]") && Catch::Contains("positive"));
+}
+
 TEST_CASE("names are escaped") {
   const auto svg = svgPlot({"a < b & \"c\"", "x", "y", {rising}});
   CHECK(occurrences(svg, "a &lt; b &amp; &quot;c&quot;") == 1);
