@@ -23,7 +23,7 @@ void requireWeights(const std::vector<AverageTerm>& terms) {
 
 Solved<Vertices> elasticAverage(const ShellStructurePtr& structure, const PairEnergy& energy,
                                 const std::vector<AverageTerm>& terms, const Vertices& start,
-                                const NewtonOptions& options) {
+                                const NewtonOptions& options, const PointPull& pull) {
   requireWeights(terms);
   ShellObjective objective(structure, energy.bending());
   for (const auto& [measures, weight] : terms) {
@@ -31,6 +31,7 @@ Solved<Vertices> elasticAverage(const ShellStructurePtr& structure, const PairEn
     objective.addUndeformed(*measures, weight);
     if (energy.symmetry() == EnergySymmetry::kSymmetric) objective.addDeformed(*measures, weight);
   }
+  if (pull.weight > 0) objective.setPull(*pull.points, pull.weight);
   return minimiseShell(objective, *structure, start, options);
 }
 

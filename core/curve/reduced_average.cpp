@@ -16,11 +16,13 @@ Vertices FrameSpace::ghost(const Eigen::VectorXd& coordinates) const {
   return shape;
 }
 
-ReducedAverage::ReducedAverage(const FrameSpace& space, const PairEnergy& energy, const std::vector<AverageTerm>& terms)
+ReducedAverage::ReducedAverage(const FrameSpace& space, const PairEnergy& energy, const std::vector<AverageTerm>& terms,
+                               CoordinatePull pull)
     : space_(space),
       topology_(space.shared->structure().topology()),
       bending_(energy.bending()),
       undeformed_(topology_),
+      pull_(std::move(pull)),
       gradient_(topology_) {
   for (const auto& term : terms) {
     if (term.weight == 0) continue;
@@ -53,6 +55,10 @@ double ReducedAverage::operator()(const Eigen::VectorXd& coordinates, Eigen::Vec
   force_.setZero(shape_.rows(), 3);
   pullBackGradient(topology_, shape_, gradient_, force_);
   project(flat(force_), gradient);
+  if (pull_.weight > 0) {
+    value += pull_.weight * (coordinates - pull_.target).squaredNorm();
+    gradient += 2 * pull_.weight * (coordinates - pull_.target);
+  }
   return value;
 }
 
@@ -67,7 +73,8 @@ Eigen::MatrixXd ReducedAverage::hessian(const Eigen::VectorXd& coordinates) {
   VectorBundle basis(shape_.size(), space_.dimension());
   basis.leftCols(space_.shared->dimension()) = space_.shared->basis();
   if (space_.own.size() > 0) basis.rightCols<1>() = space_.own;
-  const Eigen::MatrixXd hessian = basis.transpose() * (matrix * basis);
+  Eigen::MatrixXd hessian = basis.transpose() * (matrix * basis);
+  hessian.diagonal().array() += 2 * pull_.weight;
   return 0.5 * (hessian + hessian.transpose());
 }
 

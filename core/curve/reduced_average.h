@@ -16,11 +16,19 @@ struct FrameSpace {
   Vertices ghost(const Eigen::VectorXd& coordinates) const;
 };
 
+/// Draws a frame back: adds weight * |coordinates - target|^2 to what is minimised [m^2]. With orthonormal directions
+/// that is the squared distance of the vertices.
+struct CoordinatePull {
+  Eigen::VectorXd target = {};
+  double weight = 0;
+};
+
 /// The sum that an elastic average minimises, as a function of a frame's coordinates.
 class ReducedAverage {
  public:
   /// terms: measures of ghosts. space: lives as long as this.
-  ReducedAverage(const FrameSpace& space, const PairEnergy& energy, const std::vector<AverageTerm>& terms);
+  ReducedAverage(const FrameSpace& space, const PairEnergy& energy, const std::vector<AverageTerm>& terms,
+                 CoordinatePull pull = {});
 
   /// The value and its gradient in the coordinates.
   double operator()(const Eigen::VectorXd& coordinates, Eigen::VectorXd& gradient);
@@ -38,6 +46,7 @@ class ReducedAverage {
   double bending_;
   AverageEnergy undeformed_;
   std::vector<AverageTerm> deformed_;
+  CoordinatePull pull_;
   double noise_ = 0;
   Vertices shape_, force_;
   ShellMeasures measures_;

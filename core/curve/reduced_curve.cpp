@@ -32,6 +32,7 @@ ReducedCurve::ReducedCurve(const TopologyPtr& topology, double bending, const Cu
   requireCurve(*topology, curve, "frames");
   if (options.dimension < 1)
     throw InvalidInput("options", "dimension = " + std::to_string(options.dimension) + ", want >= 1");
+  stiffness_ = pullStiffness(*topology, curve.frames.front(), 1);
   const auto central = centralShape(curve.frames);
   std::vector<Vertices> aligned(curve.size());
   tbb::parallel_for(std::size_t{0}, curve.size(), [&](std::size_t i) {
@@ -70,12 +71,17 @@ SmoothingFlow ReducedCurve::flow(const SmoothingFlowOptions& options) const {
     solvers->emplace_back(frame.space, PairEnergy(bending_, options_.symmetry), options_.tolerance, options.stop,
                           options_.method);
   }
-  const auto average = [solvers](std::size_t i, const std::vector<AverageTerm>& terms, const FlowFrame& now) {
+  const double scale = options.restore_scale, stiffness = scale > 0 ? stiffness_ / (scale * scale) : 0;
+  const double share = pullShare(options_.symmetry);
+  const auto average = [this, solvers, stiffness, share](std::size_t i, const FrameTerms& terms, const FlowFrame& now) {
     auto& solver = (*solvers)[i];
-    auto solved = solver.average(terms, now.coordinates);
+    auto solved = solver.average(terms.shapes, now.coordinates, {frames_[i].start, share * stiffness * terms.pull});
     return Solved<FlowFrame>({solver.space().ghost(solved.solution), solved.solution}, solved);
   };
-  return SmoothingFlow(space_->topology(), bending_, beginning_, std::move(coordinates), average, options);
+  const auto pull = [this, stiffness](std::size_t i, const FlowFrame& frame) {
+    return stiffness * (frame.coordinates - frames_[i].start).squaredNorm();
+  };
+  return SmoothingFlow(space_->topology(), bending_, beginning_, std::move(coordinates), {average, pull}, options);
 }
 
 Vertices ReducedCurve::fine(std::size_t i, const FlowFrame& frame) const {

@@ -49,7 +49,8 @@ class ReducedCurve {
   ReducedCurveOptions options_;
   std::unique_ptr<const GhostSpace> space_;
   std::vector<Frame> frames_;
-  Curve beginning_;  ///< on the ghost mesh, placed
+  Curve beginning_;   ///< on the ghost mesh, placed
+  double stiffness_;  ///< pullStiffness() at a scale of one
 };
 
 }  // namespace shaped

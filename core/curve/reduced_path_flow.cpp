@@ -12,12 +12,12 @@ Outcome settleByFlow(const GhostSpace& space, double bending, PathCoordinates& p
     curve.frames.push_back(FrameSpace{&space}.ghost(coordinates));
     solvers.emplace_back(FrameSpace{&space}, PairEnergy(bending, options.symmetry), options.tolerance, options.stop);
   }
-  const auto average = [&](std::size_t i, const std::vector<AverageTerm>& terms, const FlowFrame& now) {
-    auto solved = solvers[i].average(terms, now.coordinates);
+  const auto average = [&](std::size_t i, const FrameTerms& terms, const FlowFrame& now) {
+    auto solved = solvers[i].average(terms.shapes, now.coordinates);
     return Solved<FlowFrame>({solvers[i].space().ghost(solved.solution), solved.solution}, solved);
   };
   const bool exact = options.symmetry == EnergySymmetry::kSymmetric;
-  SmoothingFlow flow(space.topology(), bending, curve, path, average,
+  SmoothingFlow flow(space.topology(), bending, curve, path, {average},
                      {.tau = 1, .control = exact, .place = false, .stop = options.stop});
   Outcome outcome{Termination::kIterationLimit, 0, 0};
   for (int k = 0; k < options.steps; ++k) {

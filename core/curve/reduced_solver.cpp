@@ -4,9 +4,10 @@
 
 namespace shaped {
 
-Solved<Eigen::VectorXd> ReducedSolver::average(const std::vector<AverageTerm>& terms, const Eigen::VectorXd& start) {
+Solved<Eigen::VectorXd> ReducedSolver::average(const std::vector<AverageTerm>& terms, const Eigen::VectorXd& start,
+                                               CoordinatePull pull) {
   if (stop_.stop_requested()) return {start, {Termination::kCancelled, 0, 0}};
-  ReducedAverage function(space_, energy_, terms);
+  ReducedAverage function(space_, energy_, terms, std::move(pull));
   const DescentOptions options{60, tolerance_, 0, function.noise(), stop_};
   const auto hessian = [&](const Eigen::VectorXd& coordinates) { return function.hessian(coordinates); };
   if (method_ == AverageMethod::kNewton) return minimiseNewton(std::ref(function), hessian, start, options);

@@ -21,7 +21,8 @@ class ReducedSolver {
 
   const FrameSpace& space() const { return space_; }
   /// The coordinates of the average. No iterations: the start had nothing to gain.
-  Solved<Eigen::VectorXd> average(const std::vector<AverageTerm>& terms, const Eigen::VectorXd& start);
+  Solved<Eigen::VectorXd> average(const std::vector<AverageTerm>& terms, const Eigen::VectorXd& start,
+                                  CoordinatePull pull = {});
 
  private:
   FrameSpace space_;

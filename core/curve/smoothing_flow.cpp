@@ -16,14 +16,38 @@ namespace {
 constexpr double kShortestStep = 1e-4;    ///< of options.tau; shorter ones change nothing that anybody sees
 constexpr double kShortestLength = 1e-3;  ///< of a segment, relative to the mean, where weights are one over lengths
 
+Vertices alignedTo(const Vertices& target, const Vertices& shape) { return apply(alignRigidly(shape, target), shape); }
+
+}  // namespace
+
+double pullStiffness(const Topology& topology, const Vertices& shape, double scale) {
+  if (scale == 0) return 0;
+  return measure(topology, shape).area.sum() / static_cast<double>(shape.rows()) / (scale * scale);
+}
+
+double pullShare(EnergySymmetry symmetry) { return symmetry == EnergySymmetry::kSymmetric ? 1 : 0.5; }
+
+namespace {
+
 /// In the space of all shapes, by Newton's method.
-FrameAverage fullAverage(const ShellStructurePtr& structure, const PairEnergy& energy,
-                         const SmoothingFlowOptions& options) {
-  return [=, newton = NewtonOptions{60, options.shape_tolerance, options.stop}](
-             std::size_t, const std::vector<AverageTerm>& terms, const FlowFrame& now) {
-    auto solved = elasticAverage(structure, energy, terms, now.shape, newton);
+FrameRules fullRules(const ShellStructurePtr& structure, const PairEnergy& energy, const Curve& curve,
+                     const SmoothingFlowOptions& options) {
+  if (curve.frames.empty()) return {};
+  const auto beginning = std::make_shared<const std::vector<Vertices>>(curve.frames);
+  const double stiffness = pullStiffness(structure->topology(), beginning->front(), options.restore_scale);
+  const NewtonOptions newton{60, options.shape_tolerance, options.stop};
+  const auto average = [=](std::size_t i, const FrameTerms& terms, const FlowFrame& now) {
+    const auto& target = (*beginning)[i];
+    const Vertices start = terms.pull > 0 ? alignedTo(target, now.shape) : now.shape;
+    const PointPull pull{&target, pullShare(energy.symmetry()) * terms.pull * stiffness};
+    auto solved = elasticAverage(structure, energy, terms.shapes, start, newton, pull);
     return Solved<FlowFrame>({std::move(solved.solution)}, solved);
   };
+  const auto pull = [=](std::size_t i, const FlowFrame& frame) {
+    const auto& target = (*beginning)[i];
+    return stiffness * (alignedTo(target, frame.shape) - target).squaredNorm();
+  };
+  return {average, pull};
 }
 
 }  // namespace
@@ -31,6 +55,8 @@ FrameAverage fullAverage(const ShellStructurePtr& structure, const PairEnergy& e
 std::optional<std::string> SmoothingFlowOptions::firstViolation(std::size_t frames) const {
   if (!(tau > 0 && tau <= 1)) return "tau = " + std::to_string(tau) + ", want in (0, 1]";
   if (!(shape_tolerance > 0)) return "shape_tolerance = " + std::to_string(shape_tolerance) + ", want > 0";
+  if (!(restore_scale >= 0 && std::isfinite(restore_scale)))
+    return "restore_scale = " + std::to_string(restore_scale) + ", want >= 0 and finite";
   if (!restore.empty() && restore.size() != frames)
     return "restore has " + std::to_string(restore.size()) + " entries, want one for each of " +
            std::to_string(frames) + " frames";
@@ -48,17 +74,16 @@ double SmoothingFlow::State::functional(const Coefficients& coefficients) const 
          std::inner_product(restoring.begin(), restoring.end(), coefficients.restoring.begin(), 0.0);
 }
 
-SmoothingFlow::SmoothingFlow(ShellStructurePtr structure, const PairEnergy& energy, Curve curve,
-                             SmoothingFlowOptions options)
-    : SmoothingFlow(structure->topologyPtr(), energy.bending(), std::move(curve), {},
-                    fullAverage(structure, energy, options), options) {}
+SmoothingFlow::SmoothingFlow(const ShellStructurePtr& structure, const PairEnergy& energy, const Curve& curve,
+                             const SmoothingFlowOptions& options)
+    : SmoothingFlow(structure->topologyPtr(), energy.bending(), curve, {}, fullRules(structure, energy, curve, options),
+                    options) {}
 
 SmoothingFlow::SmoothingFlow(TopologyPtr topology, double bending, Curve curve,
-                             std::vector<Eigen::VectorXd> coordinates, FrameAverage average,
-                             SmoothingFlowOptions options)
+                             std::vector<Eigen::VectorXd> coordinates, FrameRules rules, SmoothingFlowOptions options)
     : topology_(std::move(topology)),
       bending_(bending),
-      average_(std::move(average)),
+      rules_(std::move(rules)),
       options_(std::move(options)),
       tau_(options_.tau) {
   requireOneComponent(*topology_, "topology");
@@ -110,12 +135,13 @@ Solved<FlowFrame> SmoothingFlow::average(std::size_t i, double tau, const Coeffi
   const double before = coefficients.segments[previous], after = coefficients.segments[i];
   const double share = tau / (before + after);
   const double weights[] = {share * before, 1 - tau, share * after, share * coefficients.restoring[i]};
-  auto solved = average_(i,
-                         {{&now_.measures[previous], weights[0]},
-                          {&now_.measures[i], weights[1]},
-                          {&now_.measures[next], weights[2]},
-                          {&beginning_.measures[i], weights[3]}},
-                         {curve.frames[i], now_.coordinates[i]});
+  FrameTerms terms{
+      {{&now_.measures[previous], weights[0]}, {&now_.measures[i], weights[1]}, {&now_.measures[next], weights[2]}}};
+  if (options_.restore_scale > 0)
+    terms.pull = weights[3];
+  else
+    terms.shapes.push_back({&beginning_.measures[i], weights[3]});
+  auto solved = rules_.average(i, terms, {curve.frames[i], now_.coordinates[i]});
   if (!options_.place) return solved;
   const Vertices place = (weights[0] * curve.frames[previous] + weights[1] * curve.frames[i] +
                           weights[2] * curve.frames[next] + weights[3] * beginning_.curve.frames[i]) /
@@ -146,8 +172,11 @@ void SmoothingFlow::evaluate(State& state) const {
   state.segments = segmentEnergies(*topology_, bending_, state.curve, state.measures);
   state.restoring.assign(state.curve.size(), 0);
   tbb::parallel_for(std::size_t{0}, pull_.size(), [&](std::size_t i) {
+    if (!(pull_[i] > 0)) return;
     const auto &from = beginning_.measures[i], &to = state.measures[i];
-    if (pull_[i] > 0)
+    if (options_.restore_scale > 0)
+      state.restoring[i] = rules_.pull(i, {state.curve.frames[i], state.coordinates[i]});
+    else
       state.restoring[i] = shellEnergy(*topology_, from, to, bending_) + shellEnergy(*topology_, to, from, bending_);
   });
 }

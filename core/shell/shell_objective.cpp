@@ -19,6 +19,11 @@ void ShellObjective::addDeformed(ShellMeasures deformed, double weight) {
   deformed_.push_back({std::move(deformed), weight});
 }
 
+void ShellObjective::setPull(Vertices points, double weight) {
+  pull_points_ = std::move(points);
+  pull_ = weight;
+}
+
 void ShellObjective::update(const Eigen::VectorXd& x) {
   shape_ = unflatten(x);
   measure(structure_->topology(), shape_, measures_);
@@ -29,6 +34,7 @@ double ShellObjective::value(const Eigen::VectorXd& x) {
   double sum = average_.value(structure_->topology(), measures_);
   for (const auto& term : deformed_)
     sum += term.weight * shellEnergy(structure_->topology(), measures_, term.measures, bending_);
+  if (pull_ > 0) sum += pull_ * (shape_ - pull_points_).squaredNorm();
   return sum;
 }
 
@@ -41,6 +47,7 @@ double ShellObjective::gradient(const Eigen::VectorXd& x, Eigen::VectorXd& gradi
     addFirstGradient(topology, measures_, term.measures, bending_, term.weight, measures);
   Vertices result = Vertices::Zero(shape_.rows(), 3);
   pullBackGradient(topology, shape_, measures, result);
+  if (pull_ > 0) result += 2 * pull_ * (shape_ - pull_points_);
   gradient = flatten(result);
   if (!reference_norm_)
     reference_norm_ = measureReferenceNorm();
@@ -69,6 +76,7 @@ double ShellObjective::measureReferenceNorm() const {
     addFirstGradient(topology, measures_, term.measures, bending_, term.weight, measures);
     add(measures, term.weight);
   }
+  if (pull_ > 0) sum += 2 * pull_ * (shape_ - pull_points_).norm();
   return sum + weights * forceFloor(topology, shape_, measures_, bending_);
 }
 
@@ -80,9 +88,15 @@ void ShellObjective::hessian(const Eigen::VectorXd& x, bool projected, Symmetric
   for (const auto& term : deformed_)
     addFirstCurvature(topology, measures_, term.measures, bending_, term.weight, curvature);
   pullBackHessian(*structure_, shape_, curvature, hessian);
+  if (pull_ == 0) return;
+  for (std::int32_t v = 0; v < topology.vertexCount(); ++v)
+    for (const int entry : {0, 4, 8}) hessian.block(hessian.pattern().lowerSlot(v, v))[entry] += 2 * pull_;
 }
 
-Pins ShellObjective::pins(const Eigen::VectorXd& x) { return fixed_pins_ ? *fixed_pins_ : gaugePins(unflatten(x)); }
+Pins ShellObjective::pins(const Eigen::VectorXd& x) {
+  if (fixed_pins_) return *fixed_pins_;
+  return pull_ > 0 ? Pins(structure_->topology().vertexCount()) : gaugePins(unflatten(x));
+}
 
 Solved<Vertices> minimiseShell(ShellObjective& objective, const ShellStructure& structure, const Vertices& start,
                                const NewtonOptions& options) {

@@ -9,8 +9,9 @@
 namespace shaped {
 
 /// One free shape in a sum of shell energies,
-///   E(x) = sum_j w_j W[s_j, x] + sum_k v_k W[x, t_k],
-/// for Newton's method. Rigid motions are removed by pinning six unknowns, or by the pins given.
+///   E(x) = sum_j w_j W[s_j, x] + sum_k v_k W[x, t_k] + u sum_i |x_i - p_i|^2,
+/// for Newton's method. Rigid motions are removed by pinning six unknowns, or by the pins given; where points are
+/// pulled (u > 0), nothing needs to be.
 ///
 /// The residual's reference norm is the sum over the terms of the norm of each one's force, the size of the forces that
 /// balance at the minimum: measured at the first iterate, and again near the minimum in case the start was far off.
@@ -22,6 +23,8 @@ class ShellObjective : public NewtonObjective {
   void addUndeformed(const ShellMeasures& undeformed, double weight);
   /// Adds weight W[x, deformed]; weight >= 0.
   void addDeformed(ShellMeasures deformed, double weight);
+  /// Pulls the vertices towards these points, V x 3; weight >= 0. Once.
+  void setPull(Vertices points, double weight);
   /// Holds these unknowns instead of the gauge's; they must determine the rigid motion.
   void setPins(Pins pins) { fixed_pins_ = std::move(pins); }
   /// A reference norm known beforehand, which spares its evaluation.
@@ -48,6 +51,8 @@ class ShellObjective : public NewtonObjective {
   double bending_;
   AverageEnergy average_;
   std::vector<Term> undeformed_, deformed_;
+  Vertices pull_points_;
+  double pull_ = 0;
   std::optional<Pins> fixed_pins_;
   std::optional<double> reference_norm_;
   bool reference_given_ = false;

@@ -1,6 +1,7 @@
 #include "server/rpc/motion_curves.h"
 
 #include <algorithm>
+#include <cmath>
 
 #include "core/mesh/quality.h"
 #include "core/numerics/error.h"
@@ -24,6 +25,9 @@ LongClipOptions optionsFrom(const v1::SmoothRequest& request, const DatasetFrame
   options.smoothing = smoothingFromProto(request.flow(), vertices, kDefaultSmoothingSteps, "flow");
   options.smoothing.flow.stop = std::move(stop);
   options.smoothing.flow.restore = restoreFromProto(request.restore(), frames.count());
+  if (!(request.restore_scale() >= 0 && std::isfinite(request.restore_scale())))
+    throw InvalidInput("restore_scale", "= " + std::to_string(request.restore_scale()) + ", want 0 or more [m]");
+  options.smoothing.flow.restore_scale = request.restore_scale();
   options.smoothing.flow.held = heldFromProto(request.held(), frames.count());
   options.window =
       numberFromProto(request.window(), static_cast<int>(options.window), kLeastWindow, kMostWindow, "window");

@@ -2,7 +2,7 @@
 
 Skins a body of body_sequences by its own joint rotations, and again with noise that differs from frame to frame: `pose`, each joint
 turned by a random rotation of 1 degree (standard deviation of each axis); `vertex`, each vertex displaced by 1 mm (each axis); `surface`,
-a field of displacements that is smooth over some 5 cm of the surface, 3 mm (each axis), as frames captured one by one have it; `captured`,
+a field of displacements that is smooth over some 5 cm of the surface, 2 mm (each axis), as frames captured one by one have it; `captured`,
 pose and surface. Writes DEST/CLIP_{clean,pose,vertex,surface,captured}.npy (frames, 1250, 3) and the mesh DEST/CLIP.ply. CLIP: run_muscular, walk_child and sword_muscular unless given.
 """
 
@@ -86,7 +86,7 @@ def main(data, dest, clips):
         noise = rotations(numpy.radians(1) * random.standard_normal(vectors.shape))
         noise[:, 0] = numpy.eye(3)  # the root's rotation changes no shape
         shake = 0.001 * random.standard_normal((len(vectors), *rest.shape))
-        surface = 0.003 * smooth_fields(rest, read_faces(mesh, len(rest)), 0.05, len(vectors), random)
+        surface = 0.002 * smooth_fields(rest, read_faces(mesh, len(rest)), 0.05, len(vectors), random)
         clean = skinned(rest, weights, joints, hierarchy["parents"], clean_turns)
         posed = skinned(rest, weights, joints, hierarchy["parents"], clean_turns @ noise)
         truth = numpy.load(data / f"body_sequences/seq_{clip}_1k_f32.npy")

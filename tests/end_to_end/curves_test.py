@@ -88,6 +88,8 @@ class Curves(DaemonCase):
         free = self.smooth(motion)[1]
         pulled = self.smooth(motion, "--restore", 0.5)[1]
         self.assertLess(abs(pulled - noisy).max(), 0.7 * abs(free - noisy).max())
+        by_distance = self.smooth(motion, "--restore", 0.5, "--restore-scale", 0.1)[1]
+        self.assertLess(abs(by_distance - noisy).max(), 0.2 * abs(free - noisy).max())
         held = self.smooth(motion, "--hold", 7, 8)[1]
         numpy.testing.assert_array_equal(held[[7, 8]], noisy[[7, 8]])
         self.assertGreater(abs(held[9] - noisy[9]).max(), 1e-4)
@@ -129,7 +131,7 @@ class Curves(DaemonCase):
         self.assertIn("105 vertices", self.smooth(self.motion("short", noisy[:, :-1]), code=BAD_INPUT))
         good = self.motion("good", noisy)
         for option, value, message in (("--tau", 0, "flow.tau: = 0"), ("--tau", 1.5, "flow.tau"), ("--restore", 1.2, "restore[0]"),
-                                       ("--restore", -0.1, "restore[0]"), ("--hold", 6, "held[0]"), ("--hold", "x", "--hold"),
+                                       ("--restore", -0.1, "restore[0]"), ("--restore-scale", -1, "restore_scale"), ("--hold", 6, "held[0]"), ("--hold", "x", "--hold"),
                                        ("--steps", 20000, "flow.steps"), ("--steps", -1, "--steps"), ("--window", 3, "window"),
                                        ("--ghost-vertices", 2, "flow.ghost_vertices"), ("--dimension", 501, "flow.dimension"),
                                        ("--reduced", "maybe", "--reduced"), ("--bending", -1, "bending")):

@@ -12,7 +12,7 @@ namespace {
 struct Smooth {
   std::string in, template_file, out, plot, energy_plot;
   std::vector<std::string> held;
-  double restore = 0, bending = 0;
+  double restore = 0, restore_scale = 0, bending = 0;
   std::int64_t window = 0;
   bool closed = false;
   FlowFlags flow;
@@ -24,6 +24,8 @@ struct Smooth {
     arguments.required();
     flow.declare(arguments, "10");
     arguments.option("--restore", restore, "RHO", "How strongly frames are pulled to what they were, 0 to 1 (0)");
+    arguments.option("--restore-scale", restore_scale, "METRES",
+                     "Pull vertices instead of shapes: smooths noise of finer patterns, keeps coarser motion (0: off)");
     arguments.flag("--closed", closed, "The first frame follows the last; otherwise both stay as they are");
     arguments.option("--hold", held, "FRAME", "Frames to leave as they are, by index");
     arguments.option("--window", window, "N", "Frames that are smoothed at once (160)");
@@ -40,9 +42,9 @@ struct Smooth {
     const auto stub = v1::Curves::NewStub(session.channel());
     const auto stream = stub->Smooth(call.context(), request);
     const auto summary = receiveCurve(*stream, out);
-    printSmoothing(summary, {}, out, session);
     if (!plot.empty()) writeFile(plot, gradientPlot(summary, in));
     if (!energy_plot.empty()) writeFile(energy_plot, energyPlot(summary, in));
+    printSmoothing(summary, {}, out, session);
     return exitCodeOf(summary.report());
   }
 
@@ -52,6 +54,7 @@ struct Smooth {
     flow.fill(*request.mutable_flow());
     request.set_closed(closed);
     request.add_restore(restore);
+    request.set_restore_scale(restore_scale);
     for (const auto& frame : held) request.add_held(indexOf(frame));
     request.set_window(countOf("--window", window));
     request.set_bending(bending);

@@ -48,6 +48,7 @@ void stability(Report& report, const GeodesicCalculus& calculus, const std::stri
   const auto length = [&](const Path& path) {
     return lengthOf(calculus.topology(), calculus.bending(), {path, false});
   };
+  const Path still = frames;
   Path evenly = frames, anew = frames;
   std::srand(3);
   const Vertices pattern = shake * Vertices::Random(frames.front().rows(), 3);
@@ -55,8 +56,10 @@ void stability(Report& report, const GeodesicCalculus& calculus, const std::stri
     evenly[i] += std::sin(std::numbers::pi * static_cast<double>(i) / steps) * pattern;
     anew[i] += shake * Vertices::Random(anew[i].rows(), 3);
   }
-  for (const auto& [start, how] : {std::pair{&frames, "as it is"}, std::pair{&evenly, "moved by up to 0.1 mm evenly"},
-                                   std::pair{&anew, "moved by up to 0.1 mm in each frame anew"}}) {
+  for (const auto& [start, how] :
+       {std::pair<const Path*, const char*>{&still, "as it is"},
+        std::pair<const Path*, const char*>{&evenly, "moved by up to 0.1 mm evenly"},
+        std::pair<const Path*, const char*>{&anew, "moved by up to 0.1 mm in each frame anew"}}) {
     const auto solved = calculus.interpolate(frames.front(), frames.back(), steps, {}, *start);
     report.entry(
         what + ", the full problem started from the reduced path " + how,

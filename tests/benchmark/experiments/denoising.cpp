@@ -3,10 +3,12 @@
 
 #include <Eigen/Geometry>
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <cstdlib>
 #include <filesystem>
 #include <limits>
+#include <map>
 
 #include "core/curve/smoothing.h"
 #include "core/curve/trajectory_filters.h"
@@ -30,7 +32,8 @@ struct Quality {
   double roughness = 0;  ///< RMS second difference of vertices in time [m]
   double energy = 0;     ///< path energy (4) [m^2]
   double volume = 0;     ///< largest relative change over the frames
-  double limbs = 0;      ///< largest relative change of a limb's extent over limbs and frames
+  double limbs = 0;      ///< largest relative change of a limb's mean length over the frames
+  double limb = 0;       ///< largest relative change of a limb's length over limbs and frames
   std::string how;
 };
 
@@ -43,15 +46,38 @@ double volumeOf(const Faces& faces, const Vertices& shape) {
   return six / 6;
 }
 
-/// RMS distance of each limb's vertices from their middle.
-Eigen::VectorXd extents(const Vertices& shape, const std::vector<std::vector<Eigen::Index>>& limbs) {
-  Eigen::VectorXd result(static_cast<Eigen::Index>(limbs.size()));
-  for (std::size_t k = 0; k < limbs.size(); ++k) {
-    const Vertices part = shape(limbs[k], Eigen::all);
-    const Vertices centred = part.rowwise() - part.colwise().mean();
-    result[static_cast<Eigen::Index>(k)] = std::sqrt(centred.squaredNorm() / static_cast<double>(part.rows()));
+/// Where a limb ends: the edges between its vertices and those of its neighbour, by the joints that move them most.
+using Ring = std::vector<std::array<std::int32_t, 2>>;
+/// A part of the body between two joints, such as a thigh.
+using Limb = std::pair<Ring, Ring>;
+
+double lengthOf(const Limb& limb, const Vertices& shape) {
+  const auto middle = [&](const Ring& ring) {
+    Eigen::RowVector3d sum = Eigen::RowVector3d::Zero();
+    for (const auto& edge : ring) sum += 0.5 * (shape.row(edge[0]) + shape.row(edge[1]));
+    return Eigen::RowVector3d(sum / static_cast<double>(ring.size()));
+  };
+  return (middle(limb.first) - middle(limb.second)).norm();
+}
+
+/// All limbs of 15 cm or more: thighs, shanks, upper arms, forearms.
+std::vector<Limb> limbsOf(const Topology& topology, const std::vector<int>& joints, const Vertices& shape) {
+  constexpr std::size_t least = 6;  // edges around a joint
+  std::map<int, std::map<int, Ring>> rings;
+  for (const auto& edge : topology.edges()) {
+    const int a = joints[static_cast<std::size_t>(edge[0])], b = joints[static_cast<std::size_t>(edge[1])];
+    if (a == b) continue;
+    rings[a][b].push_back(edge);
+    rings[b][a].push_back(edge);
   }
-  return result;
+  std::vector<Limb> limbs;
+  for (const auto& [joint, around] : rings) {
+    std::vector<Ring> ends;
+    for (const auto& [other, ring] : around)
+      if (ring.size() >= least) ends.push_back(ring);
+    if (ends.size() == 2 && lengthOf({ends[0], ends[1]}, shape) >= 0.15) limbs.emplace_back(ends[0], ends[1]);
+  }
+  return limbs;
 }
 
 class Judge {
@@ -60,11 +86,7 @@ class Judge {
       : topology_(std::move(topology)), clean_(std::move(clean)), bending_(defaultBending(clean_.front())) {
     constexpr std::int64_t any[] = {-1};
     const auto joints = readNpy(dataPath("posed_body/rig/dominant_joint_1k_i8.npy"), any);
-    std::vector<std::vector<Eigen::Index>> parts(64);
-    for (std::size_t v = 0; v < joints.values.size(); ++v)
-      parts[static_cast<std::size_t>(joints.values[v])].push_back(static_cast<Eigen::Index>(v));
-    for (auto& part : parts)
-      if (part.size() >= 12) limbs_.push_back(std::move(part));
+    limbs_ = limbsOf(*topology_, {joints.values.begin(), joints.values.end()}, clean_.front());
   }
 
   Quality operator()(const Curve& curve, std::string how) const {
@@ -72,15 +94,20 @@ class Judge {
     quality.how = std::move(how);
     double squares = 0, second = 0;
     const auto last = curve.size() - 1;
+    std::vector<double> changes(limbs_.size(), 0);
     for (std::size_t i = 1; i < last; ++i) {
       const auto &frame = curve.frames[i], &truth = clean_[i];
       squares += (apply(alignRigidly(frame, truth), frame) - truth).squaredNorm();
       second += (curve.frames[i - 1] - 2 * frame + curve.frames[i + 1]).squaredNorm();
       const double volume = volumeOf(topology_->faces(), frame) / volumeOf(topology_->faces(), truth) - 1;
       quality.volume = std::max(quality.volume, std::abs(volume));
-      const Eigen::ArrayXd limbs = extents(frame, limbs_).array() / extents(truth, limbs_).array() - 1;
-      quality.limbs = std::max(quality.limbs, limbs.abs().maxCoeff());
+      for (std::size_t k = 0; k < limbs_.size(); ++k) {
+        const double change = lengthOf(limbs_[k], frame) / lengthOf(limbs_[k], truth) - 1;
+        quality.limb = std::max(quality.limb, std::abs(change));
+        changes[k] += change / static_cast<double>(last - 1);
+      }
     }
+    for (const double change : changes) quality.limbs = std::max(quality.limbs, std::abs(change));
     const auto measures = measuresOf(*topology_, curve), truths = measuresOf(*topology_, {clean_, false});
     for (const double energy : segmentEnergies(*topology_, bending_, curve, measures)) quality.energy += energy;
     const PairEnergy energy(bending_, EnergySymmetry::kSymmetric);
@@ -93,38 +120,52 @@ class Judge {
     return quality;
   }
 
+  int limbs() const { return static_cast<int>(limbs_.size()); }
+
  private:
   TopologyPtr topology_;
   std::vector<Vertices> clean_;
   double bending_;
-  std::vector<std::vector<Eigen::Index>> limbs_;
+  std::vector<Limb> limbs_;
 };
 
 std::string told(const Quality& quality) {
   return text(
-      "%s: error %.2f mm, elastic %.4f m, roughness %.2f mm, path energy %.4f m^2, volume %.2f %%, limbs %.2f %%",
+      "%s: error %.2f mm, elastic %.4f m, roughness %.2f mm, path energy %.4f m^2, volume %.2f %%, limbs %.2f %% in "
+      "the mean, %.2f %% "
+      "in a frame",
       quality.how.c_str(), kMillimetres * quality.error, quality.elastic, kMillimetres * quality.roughness,
-      quality.energy, kPercent * quality.volume, kPercent * quality.limbs);
+      quality.energy, kPercent * quality.volume, kPercent * quality.limbs, kPercent * quality.limb);
 }
 
-std::vector<Quality> flows(const Judge& judge, const ShellStructurePtr& structure, const Curve& noisy) {
+/// What n steps make of a motion, for several n.
+void runFlow(const Judge& judge, const ReducedCurve& reduced, const Curve& noisy, double rho, double scale,
+             std::vector<Quality>& results) {
+  SmoothingFlowOptions options;
+  options.restore.assign(noisy.size(), rho);
+  options.restore_scale = scale;
+  auto flow = reduced.flow(options);
+  Curve now = noisy;
+  int taken = 0;
+  for (const int steps : {1, 2, 4, 8, 16}) {
+    for (; taken < steps; ++taken) flow.step();
+    for (std::size_t i = 1; i + 1 < noisy.size(); ++i) now.frames[i] = reduced.fine(i, flow.frame(i));
+    results.push_back(judge(now, text("flow, rho %.2f, scale %.2f m, %ld dimensions, %d steps", rho, scale,
+                                      static_cast<long>(reduced.space().dimension()), steps)));
+  }
+}
+
+/// scales: of the restoring force, 0 for the paper's.
+std::vector<Quality> flows(const Judge& judge, const TopologyPtr& topology, const Curve& noisy,
+                           const std::vector<double>& scales) {
   std::vector<Quality> results;
-  const double bending = defaultBending(noisy.frames.front());
-  for (const double rho : {0.02, 0.1, 0.3})
-    for (const int dimension : {8, 15, 30}) {
-      SmoothingOptions options;
-      options.flow.restore.assign(noisy.size(), rho);
-      options.reduction.dimension = dimension;
-      Curve now = noisy;
-      const ReducedCurve reduced(structure->topologyPtr(), bending, noisy, options.reduction);
-      auto flow = reduced.flow(options.flow);
-      int taken = 0;
-      for (const int steps : {1, 2, 4, 8, 16}) {
-        for (; taken < steps; ++taken) flow.step();
-        for (std::size_t i = 1; i + 1 < noisy.size(); ++i) now.frames[i] = reduced.fine(i, flow.frame(i));
-        results.push_back(judge(now, text("flow, rho %.2f, %d dimensions, %d steps", rho, dimension, steps)));
-      }
-    }
+  for (const int dimension : {8, 15, 30}) {
+    ReducedCurveOptions options;
+    options.dimension = dimension;
+    const ReducedCurve reduced(topology, defaultBending(noisy.frames.front()), noisy, options);
+    for (const double scale : scales)
+      for (const double rho : {0.02, 0.1, 0.3}) runFlow(judge, reduced, noisy, rho, scale, results);
+  }
   return results;
 }
 
@@ -172,16 +213,23 @@ void denoise(Report& report, const std::string& clip, const std::string& kind) {
   const Judge judge(topology, readFrames(folder / (clip + "_clean.npy")));
   const Curve noisy{readFrames(folder / (clip + "_" + kind + ".npy")), false};
   const std::string title = clip + ", " + kind;
-  report.entry(title, told(judge(noisy, "as it is")));
-  const auto ours = flows(judge, std::make_shared<const ShellStructure>(topology), noisy);
+  report.entry(title, told(judge(noisy, text("as it is, %d limbs", judge.limbs()))));
   const auto theirs = bilaterals(judge, noisy);
-  const auto less = [](const Quality& a, const Quality& b) { return a.error < b.error; };
-  report.entry(title + ", least error", told(*std::min_element(ours.begin(), ours.end(), less)) + "; " +
-                                            told(*std::min_element(theirs.begin(), theirs.end(), less)));
-  for (const auto& [name, measure] :
-       {std::pair{"error", &Quality::error}, std::pair{"elastic error", &Quality::elastic}}) {
-    compareAtEqual(report, title + ", " + name + " at equal roughness", ours, theirs, measure, &Quality::roughness);
-    compareAtEqual(report, title + ", " + name + " at equal path energy", ours, theirs, measure, &Quality::energy);
+  const auto least = [](const std::vector<Quality>& all) {
+    return told(*std::min_element(all.begin(), all.end(),
+                                  [](const Quality& a, const Quality& b) { return a.error < b.error; }));
+  };
+  report.entry(title + ", bilateral, least error", least(theirs));
+  for (const auto& [force, scales] : {std::pair{"restored by energy", std::vector<double>{0}},
+                                      std::pair{"restored by distance", std::vector<double>{0.02, 0.05, 0.15, 0.5}}}) {
+    const auto ours = flows(judge, topology, noisy, scales);
+    const std::string of = title + ", " + force;
+    report.entry(of + ", least error", least(ours));
+    for (const auto& [name, measure] :
+         {std::pair{"error", &Quality::error}, std::pair{"elastic error", &Quality::elastic}}) {
+      compareAtEqual(report, of + ", " + name + " at equal roughness", ours, theirs, measure, &Quality::roughness);
+      compareAtEqual(report, of + ", " + name + " at equal path energy", ours, theirs, measure, &Quality::energy);
+    }
   }
 }
 

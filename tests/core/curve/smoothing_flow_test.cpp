@@ -5,6 +5,7 @@
 #include <limits>
 #include <numeric>
 
+#include "core/mesh/alignment.h"
 #include "tests/support/calculus.h"
 #include "tests/support/finite_differences.h"
 
@@ -133,18 +134,46 @@ TEST_CASE("a closed curve contracts to one shape") {
 
 TEST_CASE("with a restoring force the flow's limit does not depend on the length of its steps") {
   const auto curve = noisyCurve(6, false, 0.02);
-  std::vector<Curve> limits;
-  // rho / ((1 - rho) tau) is the same
-  for (const auto& [tau, rho] : {std::pair{0.5, 0.2}, std::pair{0.25, 1.0 / 9}}) {
-    SmoothingFlow flow(structure(), symmetric(), curve, {.tau = tau, .restore = std::vector<double>(6, rho)});
-    const auto steps = run(flow, 80);
-    for (const auto& step : steps) CHECK(step.after < step.before);
-    limits.push_back(flow.curve());
-  }
-  CHECK(largestGap(limits[0], limits[1]) < 1e-6);
   SmoothingFlow without(structure(), symmetric(), curve, {});
   run(without, 80);
-  CHECK(largestGap(limits[0], curve) < 0.6 * largestGap(without.curve(), curve));
+  // by distance, stiff deformations are hardly pulled and settle no faster than without
+  for (const auto& [scale, most] : {std::pair{0.0, 80}, std::pair{0.5, 600}}) {
+    std::vector<Curve> limits;
+    // rho / ((1 - rho) tau) is the same
+    for (const auto& [tau, rho] : {std::pair{0.5, 0.2}, std::pair{0.25, 1.0 / 9}}) {
+      SmoothingFlow flow(structure(), symmetric(), curve,
+                         {.tau = tau, .restore = std::vector<double>(6, rho), .restore_scale = scale});
+      const auto steps = run(flow, most);
+      for (const auto& step : steps) CHECK(step.after < step.before);
+      limits.push_back(flow.curve());
+    }
+    CHECK(largestGap(limits[0], limits[1]) < 1e-6);
+    CHECK(largestGap(limits[0], curve) < 0.6 * largestGap(without.curve(), curve));
+  }
+}
+
+TEST_CASE("pulled by distances, frames lose fine noise and keep coarse motion") {
+  const auto noisy = noisyCurve(16, false, 0.02), clean = noisyCurve(16, false, 0);
+  const auto error = [&](const Curve& curve) {
+    double squares = 0;
+    for (std::size_t i = 1; i + 1 < clean.size(); ++i)
+      squares +=
+          (apply(alignRigidly(curve.frames[i], clean.frames[i]), curve.frames[i]) - clean.frames[i]).squaredNorm();
+    return std::sqrt(squares);
+  };
+  const auto smoothed = [&](double rho, double scale) {
+    SmoothingFlow flow(structure(), symmetric(), noisy,
+                       {.restore = std::vector<double>(16, rho), .restore_scale = scale});
+    run(flow, 40);
+    return std::pair(error(flow.curve()), flow.pathEnergy());
+  };
+  const auto [by_distance, energy] = smoothed(0.3, 0.4);
+  CHECK(by_distance < 0.75 * error(noisy));
+  // by energy, whatever the strength: worse, or not as smooth
+  for (const double rho : {0.003, 0.01, 0.03, 0.1, 0.3}) {
+    const auto [by_energy, other] = smoothed(rho, 0);
+    CHECK((by_energy > 1.2 * by_distance || other > 1.2 * energy));
+  }
 }
 
 TEST_CASE("held frames and those restored with full strength do not move") {
@@ -265,5 +294,7 @@ TEST_CASE("the flow refuses by name what is no curve, and options out of range")
     CHECK_THROWS_WITH(make(curve, {.tau = tau}), Catch::Contains("tau"));
   CHECK_THROWS_WITH(make(curve, {.restore = {0, 0, 1.5, 0, 0}}), Catch::Contains("restore[2]"));
   CHECK_THROWS_WITH(make(curve, {.restore = {0.1}}), Catch::Contains("restore has 1 entries"));
+  for (const double scale : {-0.1, std::numeric_limits<double>::infinity(), std::numeric_limits<double>::quiet_NaN()})
+    CHECK_THROWS_WITH(make(curve, {.restore_scale = scale}), Catch::Contains("restore_scale"));
   CHECK_THROWS_WITH(make(curve, {.held = {true}}), Catch::Contains("held has 1 entries"));
 }

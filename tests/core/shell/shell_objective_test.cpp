@@ -2,6 +2,7 @@
 
 #include <catch2/catch.hpp>
 
+#include "core/mesh/alignment.h"
 #include "tests/support/calculus.h"
 #include "tests/support/finite_differences.h"
 #include "tests/support/literal_forces.h"
@@ -58,6 +59,36 @@ TEST_CASE("the objective's value, gradient and Hessian are those of the literal 
   objective.gradient(flatten(x) + 1e-6 * direction, plus);
   objective.gradient(flatten(x) - 1e-6 * direction, minus);
   CHECK((product - (plus - minus) / 2e-6).norm() < 1e-6 * product.norm());
+}
+
+TEST_CASE("a pull adds its weight times the squared distances, and fixes the shape in space") {
+  const Setting s;
+  const Vertices x = jitter(bend(s.a, 0.3), 0.03, 1), points = moveRigidly(s.a, 3);
+  auto free = s.objective(), pulled = s.objective();
+  pulled.setPull(points, 0.4);
+  CHECK(pulled.value(flatten(x)) == Approx(free.value(flatten(x)) + 0.4 * (x - points).squaredNorm()).epsilon(1e-12));
+  Eigen::VectorXd gradient, plus, minus;
+  pulled.gradient(flatten(x), gradient);
+  const Vertices numeric =
+      differenceGradient([&](const Vertices& y) { return s.literal(y) + 0.4 * (y - points).squaredNorm(); }, x, 4e-4);
+  CHECK((unflatten(gradient) - numeric).norm() < 1e-8 * numeric.norm());
+  SymmetricBlockMatrix hessian(s.structure->pattern());
+  pulled.hessian(flatten(x), false, hessian);
+  const Eigen::VectorXd direction = flatten(jitter(Vertices::Zero(x.rows(), 3), 1, 2));
+  Eigen::VectorXd product = Eigen::VectorXd::Zero(direction.size());
+  hessian.multiplyAdd(direction.data(), product.data());
+  pulled.gradient(flatten(x) + 1e-6 * direction, plus);
+  pulled.gradient(flatten(x) - 1e-6 * direction, minus);
+  CHECK((product - (plus - minus) / 2e-6).norm() < 1e-6 * product.norm());
+
+  // a rest shape that is pulled to where it lies elsewhere goes there
+  ShellObjective rest(s.structure, s.eta);
+  rest.addUndeformed(measure(s.topology(), s.a), 1);
+  rest.setPull(points, 0.01);
+  const auto solved =
+      minimiseShell(rest, *s.structure, apply(alignRigidly(bend(s.a, 0.2), points), bend(s.a, 0.2)), {});
+  REQUIRE(solved.converged());
+  CHECK((solved.solution - points).norm() < 1e-7);
 }
 
 TEST_CASE("a converged minimum balances the literal forces however bad the start was") {
