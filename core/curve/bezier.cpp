@@ -199,21 +199,18 @@ class BezierRun {
     for (auto& side : sides_) outcome += settle(*space_, bending_, side, settling_);
   }
 
-  /// Adds to the space what a rough construction wants.
+  /// Adds to the space what a rough construction of the middle wants: it is furthest from all sides.
   void enrichSpace(BezierCurve& curve, Outcome& outcome) {
     settleSides(outcome);
     PathEnrichment last;
     for (int round = 0; round < options_.geodesic.enrichments && sides_.size() > 1 && !cancelled(outcome); ++round) {
-      std::vector<PathCoordinates> rough, inner;
+      std::vector<PathCoordinates> rough;
       for (const auto& side : sides_) rough.push_back(resampled(*space_, bending_, side, kRough, settling_));
       Construction construction(*space_, bending_, settling_, rough);
-      for (const double t : {1. / 3, 2. / 3}) {
-        outcome += construction.at(t);
-        for (auto& path : construction.innerPaths()) inner.push_back(std::move(path));
-        curve.geodesics += construction.geodesics();
-      }
-      const auto grown =
-          enrich(structure_, bending_, *space_, inner, options_.geodesic.accuracy, options_.geodesic.stop);
+      outcome += construction.at(0.5);
+      curve.geodesics += construction.geodesics();
+      const auto grown = enrich(structure_, bending_, *space_, construction.innerPaths(), options_.geodesic.accuracy,
+                                options_.geodesic.stop);
       curve.missing = grown.missing;
       tell("subspace of " + std::to_string(space_->dimension()),
            kSides + (kSpace - kSides) * (round + 1) / options_.geodesic.enrichments, outcome);
@@ -252,7 +249,7 @@ class BezierRun {
     return frames;
   }
 
-  static constexpr double kSides = 0.3, kSpace = 0.5;  ///< shares of the work done after the sides and the space
+  static constexpr double kSides = 0.45, kSpace = 0.75;  ///< shares of the work done after the sides and the space
 
   const ShellStructurePtr& structure_;
   double bending_;

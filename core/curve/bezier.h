@@ -27,8 +27,8 @@ struct BezierCurve {
 /// 7). The point at t of n control shapes is the point at t of the geodesic between the points at t of the first n - 1
 /// and of the last n - 1. With two of them it is a geodesic.
 ///
-/// All happens in one subspace: of the geodesics between neighbouring control shapes, enriched by the construction at a
-/// few points of the curve (enrich()), and on one ghost mesh. Each geodesic of the construction starts from the one at
+/// All happens in one subspace: of the geodesics between neighbouring control shapes, enriched by the construction in
+/// the middle of the curve (enrich()), and on one ghost mesh. Each geodesic of the construction starts from the one at
 /// the t before. Positions in space follow the Bezier curve of the control shapes' positions.
 ///
 /// controls: two or more, V x 3 each, of one component. Throws InvalidInput naming "controls", "controls[i]",
