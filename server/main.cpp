@@ -1,6 +1,7 @@
 #include <iostream>
 #include <thread>
 
+#include "core/numerics/blas_kernels.h"
 #include "core/numerics/error.h"
 #include "core/numerics/threads.h"
 #include "server/daemon/command_line.h"
@@ -38,7 +39,7 @@ int serve(const server::DaemonOptions& options, const std::vector<std::string>& 
   server::takeGrpcLog();
   server::Daemon daemon(options);
   server::logInfo("listening on " + daemon.address() + ", store " + options.store.string() + ", " +
-                  std::to_string(options.threads) + " threads" +
+                  std::to_string(options.threads) + " threads, OpenBLAS for " + blasKernels() +
                   (daemon.scrapeAddress().empty() ? "" : ", metrics on http://" + daemon.scrapeAddress() + "/metrics"));
   server::notifySupervisor("READY=1");
   while (server::waitForSignal() == server::Signal::kReload) reload(daemon, words);
@@ -72,6 +73,7 @@ int run(const std::vector<std::string>& words) {
 }  // namespace
 
 int main(int argc, char** argv) {
+  useBestBlasKernels();
   server::catchSignals();
   limitLibraryThreads();
   server::raiseDescriptorLimit();
