@@ -1,6 +1,7 @@
 #include "core/curve/geodesic_flow.h"
 
 #include <tbb/parallel_for.h>
+#include <tbb/parallel_invoke.h>
 
 #include <algorithm>
 #include <cmath>
@@ -12,6 +13,7 @@
 #include "core/mesh/alignment.h"
 #include "core/numerics/error.h"
 #include "core/reduction/krylov.h"
+#include "core/shell/shell_objective.h"
 
 namespace shaped {
 namespace {
@@ -119,21 +121,27 @@ Solved<GeodesicFlow> geodesicByFlow(const ShellStructurePtr& structure, double b
   const auto onto_a = alignRigidly(b, a);
   const Vertices aligned = apply(onto_a, b);
   Solved<GeodesicFlow> result({Curve{{a, b}, false}}, {});
-  auto subspace = krylovSubspace(structure, bending, a, aligned, options.dimension, options.stop);
+  // Each of these is one thing after the other, and none needs the others.
+  Solved<ShapeSubspace> subspace;
+  std::vector<Vertices> between;
+  std::shared_ptr<const Coarsening> ghost = options.ghost;
+  tbb::parallel_invoke(
+      [&] {
+        if (!ghost)
+          ghost = std::make_shared<const Coarsening>(
+              coarsen(structure->topologyPtr(), {a, aligned}, {options.ghost_vertices, {}, options.stop}));
+      },
+      [&] { subspace = krylovSubspace(structure, bending, a, aligned, options.dimension, options.stop); },
+      [&] {
+        if (static_cast<std::size_t>(options.frames) >= kRough)
+          between = blends(structure->topologyPtr(), a, aligned, options.stop);
+      });
   if (!subspace.converged()) return {std::move(result.solution), subspace};
-  std::vector<Vertices> rough{a, aligned};
-  if (static_cast<std::size_t>(options.frames) >= kRough) {
-    const auto between = blends(structure->topologyPtr(), a, aligned, options.stop);
-    rough.insert(rough.begin() + 1, between.begin(), between.end());
-    for (const auto& shape : between)
-      subspace.solution.append(Eigen::Map<const Eigen::VectorXd>(shape.data(), shape.size()) -
-                               Eigen::Map<const Eigen::VectorXd>(a.data(), a.size()));
-  }
-  PathCoordinates start;
-  for (const auto& shape : rough) start.push_back(subspace.solution.coordinates(shape));
-  GhostSpace space(options.ghost ? *options.ghost
-                                 : coarsen(structure->topologyPtr(), rough, {options.ghost_vertices, {}, options.stop}),
-                   std::move(subspace.solution));
+  for (const auto& shape : between) subspace.solution.append(flatten(shape) - flatten(a));
+  PathCoordinates start{subspace.solution.coordinates(a)};
+  for (const auto& shape : between) start.push_back(subspace.solution.coordinates(shape));
+  start.push_back(subspace.solution.coordinates(aligned));
+  GhostSpace space(*ghost, std::move(subspace.solution));
   Refinement refinement(structure, space, bending, options);
   const auto path = refinement.run(std::move(start), progress);
   if (path.termination == Termination::kCancelled) return {std::move(result.solution), path};

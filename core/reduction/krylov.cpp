@@ -1,5 +1,9 @@
 #include "core/reduction/krylov.h"
 
+#include <tbb/parallel_invoke.h>
+
+#include <optional>
+
 #include "core/shell/energy.h"
 
 namespace shaped {
@@ -73,14 +77,16 @@ Solved<ShapeSubspace> krylovSubspace(const ShellStructurePtr& structure, double 
     return Solved<ShapeSubspace>(std::move(result), {termination, 0, 0});
   };
   if (!result.append(flat(b) - flat(a))) return ended(Termination::kConverged);  // the shapes are equal
-  const RestingShape at_a(structure, bending, a, stop), at_b(structure, bending, b, stop);
+  std::optional<RestingShape> at_a, at_b;
+  tbb::parallel_invoke([&] { at_a.emplace(structure, bending, a, stop); },
+                       [&] { at_b.emplace(structure, bending, b, stop); });
   if (stop.stop_requested()) return ended(Termination::kCancelled);
-  if (!at_a.usable() || !at_b.usable()) return ended(Termination::kNumericalFailure);
+  if (!at_a->usable() || !at_b->usable()) return ended(Termination::kNumericalFailure);
   // Each sequence goes on from what was new in its last vector: the powers themselves would soon all look the same.
-  Vector from_a = at_a.towards(at_b.measures()), from_b = at_b.towards(at_a.measures());
+  Vector from_a = at_a->towards(at_b->measures()), from_b = at_b->towards(at_a->measures());
   while (result.dimension() < dimension && (from_a.size() > 0 || from_b.size() > 0)) {
     if (stop.stop_requested()) return ended(Termination::kCancelled);
-    for (auto [shape, next] : {std::pair{&at_a, &from_a}, std::pair{&at_b, &from_b}}) {
+    for (auto [shape, next] : {std::pair{&*at_a, &from_a}, std::pair{&*at_b, &from_b}}) {
       if (next->size() == 0 || result.dimension() == dimension) continue;
       const bool more = result.append(*next);
       *next = more ? shape->smoother(result.basis.rightCols<1>()) : Vector();

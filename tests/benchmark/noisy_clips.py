@@ -3,7 +3,8 @@
 Skins a body of body_sequences by its own joint rotations, and again with noise that differs from frame to frame: `pose`, each joint
 turned by a random rotation of 1 degree (standard deviation of each axis); `vertex`, each vertex displaced by 1 mm (each axis); `surface`,
 a field of displacements that is smooth over some 5 cm of the surface, 2 mm (each axis), as frames captured one by one have it; `captured`,
-pose and surface. Writes DEST/CLIP_{clean,pose,vertex,surface,captured}.npy (frames, 1250, 3) and the mesh DEST/CLIP.ply. CLIP: run_muscular, walk_child and sword_muscular unless given.
+pose and surface. Writes DEST/CLIP_{clean,pose,vertex,surface,captured}.npy (frames, 1250, 3) and the mesh DEST/CLIP.ply. With DEST/fit_TRIAL.npy, what
+`shapectl fit` made of DATA/marker_trials/markers_TRIAL_f32.npy (all frames, at full resolution), also trial_TRIAL_{clean,captured}.npy. CLIP: run_muscular, walk_child and sword_muscular unless given.
 """
 
 import json
@@ -96,6 +97,15 @@ def main(data, dest, clips):
                              ("captured", posed + surface)):
             numpy.save(dest / f"{clip}_{kind}.npy", frames.astype(numpy.float32))
         shutil.copy(mesh, dest / f"{clip}.ply")
+    for fit in dest.glob("fit_*.npy"):
+        trial = fit.stem.removeprefix("fit_")
+        fitted = numpy.load(fit)[:, index]
+        truth = numpy.load(data / f"marker_trials/gt_{trial}_1k_f32.npy")
+        fitted = fitted.astype(float) - fitted.mean(1, keepdims=True) + truth.mean(1, keepdims=True)
+        print(f"trial {trial}: {len(fitted)} frames; noise [mm RMS] {rms(fitted - truth):.1f}, beside its mean over the frames"
+              f" {rms(fitted - truth - (fitted - truth).mean(0)):.1f}")
+        numpy.save(dest / f"trial_{trial}_clean.npy", truth.astype(numpy.float32))
+        numpy.save(dest / f"trial_{trial}_captured.npy", fitted.astype(numpy.float32))
 
 
 def rms(difference):

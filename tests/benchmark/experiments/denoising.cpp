@@ -204,9 +204,13 @@ void compareAtEqual(Report& report, const std::string& title, const std::vector<
                ratio >= 2 && keepsSize(*best));
 }
 
-void denoise(Report& report, const std::string& clip, const std::string& kind) {
+std::filesystem::path noisyFolder() {
   const char* given = std::getenv("SHAPED_NOISY");
-  const std::filesystem::path folder = given != nullptr ? given : "/tmp/noisy";
+  return given != nullptr ? given : "/tmp/noisy";
+}
+
+void denoise(Report& report, const std::string& clip, const std::string& kind) {
+  const auto folder = noisyFolder();
   if (!std::filesystem::exists(folder / (clip + "_clean.npy")))
     throw MissingData((folder / (clip + "_clean.npy")).string() + " is not there: run tests/benchmark/noisy_clips.py");
   const auto topology = bodies1k().topology;
@@ -239,6 +243,9 @@ void denoising() {
   Report report("Denoising");
   for (const char* clip : {"run_muscular", "walk_child", "sword_muscular"})
     for (const char* kind : {"pose", "vertex", "surface", "captured"}) denoise(report, clip, kind);
+  for (const char* clip : {"trial_walk", "trial_wash"})
+    if (std::filesystem::exists(noisyFolder() / (std::string(clip) + "_captured.npy")))
+      denoise(report, clip, "captured");
 }
 
 }  // namespace shaped::experiments

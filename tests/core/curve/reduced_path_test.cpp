@@ -161,7 +161,8 @@ TEST_CASE("points of a path are its frames and averages between them") {
   const auto finer = resampled(space, f.bending, path, 9, {});
   REQUIRE(finer.size() == 9);
   CHECK(finer[2] == path[1]);
-  CHECK(finer[3] == between.solution);
+  // found one after the other, from each other's Hessians: the same to the solver's tolerance
+  CHECK((finer[3] - between.solution).norm() < 1e-3 * between.solution.norm());
   // half a step each: a quarter of the energy per segment, twice the segments
   CHECK(pathEnergy(space, f.bending, finer) == Approx(0.5 * pathEnergy(space, f.bending, path)).epsilon(0.01));
 }
