@@ -4,6 +4,7 @@
 #include "core/numerics/blas_kernels.h"
 #include "core/numerics/error.h"
 #include "core/numerics/threads.h"
+#include "server/daemon/best_kernels.h"
 #include "server/daemon/command_line.h"
 #include "server/daemon/daemon.h"
 #include "server/daemon/grpc_log.h"
@@ -73,7 +74,7 @@ int run(const std::vector<std::string>& words) {
 }  // namespace
 
 int main(int argc, char** argv) {
-  useBestBlasKernels();
+  server::useBestBlasKernels();
   server::catchSignals();
   limitLibraryThreads();
   server::raiseDescriptorLimit();

@@ -12,14 +12,14 @@ struct VectorUnits {
   bool avx2 = false;    ///< with fused multiply-add
   bool avx512 = false;  ///< F, CD, BW, DQ and VL
 };
+/// Of the processor that this runs on.
+VectorUnits vectorUnits();
 
 /// Better kernels for such a processor than those it got, where these are made for ones without AVX2; else empty.
+/// OpenBLAS below 0.3.25 takes Intel's processors that are younger than itself for ones of 2004 (its issue 4267), and
+/// factorises at a third of the speed then. It chooses while it is loaded, and listens to kBlasKernelsVariable alone.
 std::string betterBlasKernels(const std::string& got, const VectorUnits& units);
 
-/// OpenBLAS below 0.3.25 takes Intel's processors that are younger than itself for ones of 2004 (its issue 4267), and
-/// factorises at a third of the speed then. It chooses while it is loaded and listens to OPENBLAS_CORETYPE alone: where
-/// it chose badly, this starts the program anew with that variable. Returns where there is nothing to mend, somebody
-/// else has set it, or that fails. To be called before anything else in main().
-void useBestBlasKernels();
+inline constexpr const char* kBlasKernelsVariable = "OPENBLAS_CORETYPE";
 
 }  // namespace shaped

@@ -1,6 +1,8 @@
 """Starting, reading the configuration again, and stopping."""
 
 import pathlib
+import platform
+import re
 import signal
 import subprocess
 import tempfile
@@ -52,6 +54,18 @@ class Lifecycle(unittest.TestCase):
         bad = run("--check", "--config", self.config)
         self.assertEqual((bad.returncode, bad.stdout), (2, ""))
         self.assertIn("shaped.yaml:2: threads: \"none\"", bad.stderr)
+
+    @unittest.skipUnless(platform.machine() == "x86_64", "OpenBLAS has other names for kernels elsewhere")
+    def test_it_runs_the_kernels_that_the_processor_deserves_unless_told(self):
+        flags = pathlib.Path("/proc/cpuinfo").read_text()
+        daemon = Daemon(self.folder / "store", before=("env", "-u", "OPENBLAS_CORETYPE"))
+        self.addCleanup(daemon.stop, signal.SIGKILL)
+        kernels = re.search(r"OpenBLAS for (\w+)", daemon.log).group(1)
+        if " avx2 " in flags:
+            self.assertNotIn(kernels, ("Prescott", "Nehalem", "Sandybridge"))
+        told = Daemon(self.folder / "other", before=("env", "OPENBLAS_CORETYPE=Nehalem"))
+        self.addCleanup(told.stop, signal.SIGKILL)
+        self.assertIn("OpenBLAS for Nehalem", told.log)
 
     def test_sighup_takes_over_what_is_safe(self):
         self.config.write_text("queue-length: 9\nthreads: 1\n")

@@ -7,8 +7,8 @@
 #include <functional>
 #include <map>
 
-#include "core/numerics/blas_kernels.h"
 #include "core/numerics/threads.h"
+#include "server/daemon/best_kernels.h"
 #include "tests/benchmark/experiments/data.h"
 #include "tests/benchmark/experiments/experiment.h"
 
@@ -20,7 +20,7 @@ int main(int argc, char** argv) {
       {"5", row5Training},      {"6", row6Projection},    {"7", row7Generalisation}, {"8", row8RealTrial},
       {"9", row9VirtualTrials}, {"10", row10HandleEdits}, {"11", row11RigidMotions}, {"curves", curves},
       {"motions", motions},     {"denoising", denoising}, {"stop", stopLatency}};
-  shaped::useBestBlasKernels();
+  shaped::server::useBestBlasKernels();
   shaped::limitLibraryThreads();
   if (argc < 2) {
     std::fprintf(stderr,
