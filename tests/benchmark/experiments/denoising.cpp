@@ -24,6 +24,7 @@ namespace shaped::experiments {
 namespace {
 
 constexpr double kMillimetres = 1000, kPercent = 100;
+constexpr std::string_view kClean = "_clean.npy";
 
 /// What a filter made of a motion, against the clean one.
 struct Quality {
@@ -209,12 +210,9 @@ std::filesystem::path noisyFolder() {
   return given != nullptr ? given : "/tmp/noisy";
 }
 
-void denoise(Report& report, const std::string& clip, const std::string& kind) {
-  const auto folder = noisyFolder();
-  if (!std::filesystem::exists(folder / (clip + "_clean.npy")))
-    throw MissingData((folder / (clip + "_clean.npy")).string() + " is not there: run tests/benchmark/noisy_clips.py");
+void denoise(Report& report, const std::filesystem::path& folder, const std::string& clip, const std::string& kind) {
   const auto topology = bodies1k().topology;
-  const Judge judge(topology, readFrames(folder / (clip + "_clean.npy")));
+  const Judge judge(topology, readFrames(folder / (clip + std::string(kClean))));
   const Curve noisy{readFrames(folder / (clip + "_" + kind + ".npy")), false};
   const std::string title = clip + ", " + kind;
   report.entry(title, told(judge(noisy, text("as it is, %d limbs", judge.limbs()))));
@@ -241,11 +239,17 @@ void denoise(Report& report, const std::string& clip, const std::string& kind) {
 
 void denoising() {
   Report report("Denoising");
-  for (const char* clip : {"run_muscular", "walk_child", "sword_muscular"})
-    for (const char* kind : {"pose", "vertex", "surface", "captured"}) denoise(report, clip, kind);
-  for (const char* clip : {"trial_walk", "trial_wash"})
-    if (std::filesystem::exists(noisyFolder() / (std::string(clip) + "_captured.npy")))
-      denoise(report, clip, "captured");
+  const auto folder = noisyFolder();
+  std::vector<std::string> clips;
+  if (std::filesystem::exists(folder))
+    for (const auto& entry : std::filesystem::directory_iterator(folder))
+      if (const auto name = entry.path().filename().string(); name.ends_with(kClean))
+        clips.push_back(name.substr(0, name.size() - kClean.size()));
+  if (clips.empty()) throw MissingData(folder.string() + " has no clips: run tests/benchmark/noisy_clips.py");
+  std::sort(clips.begin(), clips.end());
+  for (const auto& clip : clips)
+    for (const char* kind : {"pose", "vertex", "surface", "captured"})
+      if (std::filesystem::exists(folder / (clip + "_" + kind + ".npy"))) denoise(report, folder, clip, kind);
 }
 
 }  // namespace shaped::experiments
