@@ -57,6 +57,12 @@ struct Axis {
     return pixel_low + (scaled(value) - low) / (high - low) * (pixel_high - pixel_low);
   }
 
+  /// Powers of ten beyond four digits in short: the axis' name stands beside them.
+  std::string label(double tick) const {
+    const int power = logarithmic ? static_cast<int>(std::lround(std::log10(tick))) : 0;
+    return std::abs(power) < 4 ? format("%.6g", tick) : format("1e%d", power);
+  }
+
  private:
   double scaled(double value) const { return logarithmic ? std::log10(value) : value; }
 };
@@ -114,7 +120,7 @@ std::string axes(const LinePlot& plot, const Frame& frame) {
   for (const double tick : y.ticks) {
     svg += format("<line x1=\"%.1f\" x2=\"%.1f\" y1=\"%.1f\" y2=\"%.1f\" stroke=\"#e3e6ea\"/>\n", x.pixel_low,
                   x.pixel_high, y.pixel(tick), y.pixel(tick));
-    svg += textElement(x.pixel_low - 9, y.pixel(tick) + 4.5, format("%.6g", tick), "text-anchor=\"end\"");
+    svg += textElement(x.pixel_low - 9, y.pixel(tick) + 4.5, y.label(tick), "text-anchor=\"end\"");
   }
   for (const double tick : x.ticks) {
     svg += format("<line x1=\"%.1f\" x2=\"%.1f\" y1=\"%.1f\" y2=\"%.1f\" stroke=\"#8a9099\"/>\n", x.pixel(tick),

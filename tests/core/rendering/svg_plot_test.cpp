@@ -76,6 +76,9 @@ TEST_CASE("a logarithmic axis has powers of ten, equally far") {
   REQUIRE(std::sscanf(svg.c_str() + next, "<circle cx=\"%*f\" cy=\"%lf", &second) == 1);
   CHECK(first == Approx(20));
   CHECK(second == Approx(20 + 362 / 2.0));
+  plot.series[0].y = {1, 1e-3, 1e-4, 1e-5};
+  CHECK(occurrences(svgPlot(plot), ">0.001<") == 1);
+  CHECK(occurrences(svgPlot(plot), ">1e-4<") == 1);
   plot.series[0].y = {0, -1, 0, 0};
   CHECK_THROWS_WITH(svgPlot(plot), Catch::Contains("series[0]") && Catch::Contains("positive"));
 }
