@@ -71,15 +71,16 @@ SmoothingFlow ReducedCurve::flow(const SmoothingFlowOptions& options) const {
     solvers->emplace_back(frame.space, PairEnergy(bending_, options_.symmetry), options_.tolerance, options.stop,
                           options_.method);
   }
+  const auto beginning = std::make_shared<const std::vector<Eigen::VectorXd>>(coordinates);
   const double scale = options.restore_scale, stiffness = scale > 0 ? stiffness_ / (scale * scale) : 0;
   const double share = pullShare(options_.symmetry);
-  const auto average = [this, solvers, stiffness, share](std::size_t i, const FrameTerms& terms, const FlowFrame& now) {
+  const auto average = [=](std::size_t i, const FrameTerms& terms, const FlowFrame& now) {
     auto& solver = (*solvers)[i];
-    auto solved = solver.average(terms.shapes, now.coordinates, {frames_[i].start, share * stiffness * terms.pull});
+    auto solved = solver.average(terms.shapes, now.coordinates, {(*beginning)[i], share * stiffness * terms.pull});
     return Solved<FlowFrame>({solver.space().ghost(solved.solution), solved.solution}, solved);
   };
-  const auto pull = [this, stiffness](std::size_t i, const FlowFrame& frame) {
-    return stiffness * (frame.coordinates - frames_[i].start).squaredNorm();
+  const auto pull = [=](std::size_t i, const FlowFrame& frame) {
+    return stiffness * (frame.coordinates - (*beginning)[i]).squaredNorm();
   };
   return SmoothingFlow(space_->topology(), bending_, beginning_, std::move(coordinates), {average, pull}, options);
 }

@@ -32,7 +32,7 @@ namespace {
 /// In the space of all shapes, by Newton's method.
 FrameRules fullRules(const ShellStructurePtr& structure, const PairEnergy& energy, const Curve& curve,
                      const SmoothingFlowOptions& options) {
-  if (curve.frames.empty()) return {};
+  requireCurve(structure->topology(), curve, "frames");
   const auto beginning = std::make_shared<const std::vector<Vertices>>(curve.frames);
   const double stiffness = pullStiffness(structure->topology(), beginning->front(), options.restore_scale);
   const NewtonOptions newton{60, options.shape_tolerance, options.stop};

@@ -290,6 +290,8 @@ TEST_CASE("the flow refuses by name what is no curve, and options out of range")
   bad = curve;
   bad.frames[2] = icosphere(0).vertices;
   CHECK_THROWS_WITH(make(bad, {}), Catch::Contains("frames[2]: has 12 vertices"));
+  bad.frames[0] = icosphere(0).vertices;
+  CHECK_THROWS_WITH(make(bad, {.restore_scale = 0.1}), Catch::Contains("frames[0]: has 12 vertices"));
   for (const double tau : {0.0, -1.0, 1.1, std::numeric_limits<double>::quiet_NaN()})
     CHECK_THROWS_WITH(make(curve, {.tau = tau}), Catch::Contains("tau"));
   CHECK_THROWS_WITH(make(curve, {.restore = {0, 0, 1.5, 0, 0}}), Catch::Contains("restore[2]"));
