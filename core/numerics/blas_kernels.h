@@ -17,7 +17,7 @@ VectorUnits vectorUnits();
 
 /// Better kernels for such a processor than those it got, where these are made for ones without AVX2; else empty.
 /// OpenBLAS below 0.3.25 takes Intel's processors that are younger than itself for ones of 2004 (its issue 4267), and
-/// factorises at a third of the speed then. It chooses while it is loaded, and listens to kBlasKernelsVariable alone.
+/// factorises at half the speed then. It chooses while it is loaded, and listens to kBlasKernelsVariable alone.
 std::string betterBlasKernels(const std::string& got, const VectorUnits& units);
 
 inline constexpr const char* kBlasKernelsVariable = "OPENBLAS_CORETYPE";

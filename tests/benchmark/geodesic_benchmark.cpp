@@ -13,7 +13,6 @@
 #include "core/geodesic/geodesic.h"
 #include "core/io/mesh_file.h"
 #include "core/mesh/coarsening.h"
-#include "core/numerics/threads.h"
 #include "core/shell/energy.h"
 #include "tests/support/shapes.h"
 
@@ -71,7 +70,6 @@ bool isRight(const GeodesicCalculus& calculus, const Ends& ends, const Solved<Pa
 }
 
 void timeGeodesic(benchmark::State& state, const Ends& ends) {
-  limitLibraryThreads();
   tbb::task_arena one_thread(1);
   one_thread.execute([&] {
     const GeodesicCalculus calculus(std::make_shared<ShellStructure>(ends.topology), ends.bending);
@@ -96,7 +94,6 @@ void cactusGeodesic(benchmark::State& state) {
 }
 
 void analysis(benchmark::State& state) {
-  limitLibraryThreads();
   const auto ends = tubeEnds(50, 40);
   for (auto _ : state) {
     const GeodesicCalculus calculus(std::make_shared<ShellStructure>(ends.topology), ends.bending);

@@ -16,7 +16,6 @@
 #include "core/io/mesh_file.h"
 #include "core/mesh/prolongation.h"
 #include "core/mesh/quality.h"
-#include "core/numerics/threads.h"
 #include "tests/support/shapes.h"
 
 using namespace shaped;
@@ -84,7 +83,6 @@ std::optional<Shapes> load(int set) {
 const Model* model(int set) {
   static std::map<int, std::optional<Model>> models;
   if (const auto known = models.find(set); known != models.end()) return known->second ? &*known->second : nullptr;
-  limitLibraryThreads();
   auto& entry = models[set];
   if (const auto shapes = load(set)) {
     entry.emplace(Model{*shapes, coarsen(shapes->topology, shapes->training), {}, {}});

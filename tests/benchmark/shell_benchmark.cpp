@@ -5,7 +5,6 @@
 
 #include <functional>
 
-#include "core/numerics/threads.h"
 #include "core/shell/energy.h"
 #include "tests/support/literal_shell_energy.h"
 #include "tests/support/shapes.h"
@@ -38,9 +37,7 @@ struct Problem {
         gradient(s.rows(), 3),
         curvature(*topology, HessianKind::kExact),
         hessian(structure.pattern()),
-        mixed(structure.pattern()) {
-    limitLibraryThreads();
-  }
+        mixed(structure.pattern()) {}
 
   void measureBoth() {
     measure(*topology, s, s_measures);
