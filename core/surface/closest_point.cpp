@@ -6,9 +6,9 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
-#include <string>
 
 #include "core/numerics/error.h"
+#include "core/surface/triangles.h"
 
 namespace shaped {
 namespace {
@@ -31,15 +31,6 @@ bool interiorFoot(const Eigen::RowVector3d& query, const Eigen::RowVector3d& a, 
   const double weight_b = aq.cross(ac).dot(normal) / area, weight_c = ab.cross(aq).dot(normal) / area;
   barycentric << 1 - weight_b - weight_c, weight_b, weight_c;
   return barycentric.minCoeff() >= 0;
-}
-
-void requireMesh(const Vertices& vertices, const Faces& faces) {
-  if (faces.rows() == 0) throw InvalidInput("faces", "closest points need at least one face");
-  if (!vertices.allFinite()) throw InvalidInput("vertices", "hold a coordinate that is not a finite number");
-  for (Eigen::Index f = 0; f < faces.rows(); ++f)
-    if (faces.row(f).minCoeff() < 0 || faces.row(f).maxCoeff() >= vertices.rows())
-      throw InvalidInput("faces[" + std::to_string(f) + "]",
-                         "has a vertex index outside [0, " + std::to_string(vertices.rows()) + ")");
 }
 
 /// The nearest single-precision number not above the value.
@@ -142,7 +133,7 @@ struct ClosestPointQuery::Hierarchy {
 };
 
 ClosestPointQuery::ClosestPointQuery(const Vertices& vertices, const Faces& faces) {
-  requireMesh(vertices, faces);
+  requireTriangles(vertices, faces);
   hierarchy_ = std::make_unique<Hierarchy>(vertices, faces);
 }
 
