@@ -47,6 +47,25 @@ if(SHAPED_SUPERNODAL)
   target_link_libraries(shaped_suitesparse INTERFACE ${shaped_cholmod} ${METIS_LIBRARY} OpenMP::OpenMP_CXX)
 endif()
 
+# Ceres without its library's Eigen, and without solvers that we do not use (cmake/isolate-ceres).
+find_library(SHAPED_CERES_ARCHIVE libceres.a REQUIRED)
+mark_as_advanced(SHAPED_CERES_ARCHIVE)
+set(shaped_ceres_stubs _Z13SuiteSparseQR cs_di_)
+if(NOT SHAPED_SUPERNODAL)
+  list(APPEND shaped_ceres_stubs cholmod_)
+endif()
+set(shaped_ceres_object ${PROJECT_BINARY_DIR}/ceres_isolated.o)
+add_custom_command(OUTPUT ${shaped_ceres_object}
+                   COMMAND ${PROJECT_SOURCE_DIR}/cmake/isolate-ceres ${SHAPED_CERES_ARCHIVE} ${shaped_ceres_object} ${shaped_ceres_stubs}
+                   DEPENDS ${PROJECT_SOURCE_DIR}/cmake/isolate-ceres ${SHAPED_CERES_ARCHIVE} VERBATIM)
+add_library(shaped_ceres STATIC ${shaped_ceres_object})
+set_target_properties(shaped_ceres PROPERTIES LINKER_LANGUAGE CXX)
+target_include_directories(shaped_ceres SYSTEM INTERFACE $<TARGET_PROPERTY:Ceres::ceres,INTERFACE_INCLUDE_DIRECTORIES>)
+target_link_libraries(shaped_ceres INTERFACE glog::glog gflags Eigen3::Eigen)
+if(SHAPED_SUPERNODAL)
+  target_link_libraries(shaped_ceres INTERFACE shaped_suitesparse)
+endif()
+
 if(SHAPED_TESTS)
   find_package(Catch2 2 CONFIG REQUIRED)
   find_package(benchmark CONFIG REQUIRED)

@@ -68,19 +68,30 @@ Eigen::Vector3d PosedSkin::carried(Eigen::Index vertex, Eigen::Index joint) cons
          bones_.joints.row(joint).transpose();
 }
 
-void PosedSkin::poseDerivative(Eigen::Index vertex, Eigen::Ref<Eigen::Matrix3Xd> columns) const {
-  columns.setZero();
-  columns.leftCols<3>().setIdentity();
-  // Summed into the columns first: in each joint's first one the arms of its levers.
-  const auto lever = [&](std::int32_t joint) { return columns.col(3 + 3 * joint); };
+void PosedSkin::addLevers(Eigen::Index vertex, double share, Eigen::Matrix3Xd& levers) const {
   for (SkinWeights::InnerIterator entry(weights_, vertex); entry; ++entry) {
+    const double weight = share * entry.value();
     const Eigen::Vector3d place = carried(vertex, entry.col());
     for (std::int32_t joint = std::int32_t(entry.col()); joint >= 0; joint = tree_.parent(joint))
-      lever(joint) += entry.value() * (place - bones_.joints.row(joint).transpose());
+      levers.col(joint) += weight * (place - bones_.joints.row(joint).transpose());
   }
-  for (std::int32_t joint = 0; joint < tree_.jointCount(); ++joint) {
-    const Eigen::Vector3d arm = lever(joint);
-    if (arm.squaredNorm() > 0) columns.middleCols<3>(3 + 3 * joint) = -crossMatrix(arm) * turns_[std::size_t(joint)];
+}
+
+void PosedSkin::poseRow(const Eigen::Matrix3Xd& levers, const Eigen::Vector3d& direction,
+                        Eigen::Ref<Eigen::VectorXd> row) const {
+  row.head<3>() = direction;
+  for (std::int32_t joint = 0; joint < tree_.jointCount(); ++joint)
+    row.segment<3>(3 + 3 * joint) =
+        turns_[std::size_t(joint)].transpose() * Eigen::Vector3d(levers.col(joint)).cross(direction);
+}
+
+void PosedSkin::poseDerivative(Eigen::Index vertex, Eigen::Ref<Eigen::Matrix3Xd> columns) const {
+  Eigen::Matrix3Xd levers = Eigen::Matrix3Xd::Zero(3, tree_.jointCount());
+  addLevers(vertex, 1, levers);
+  Eigen::VectorXd row(columns.cols());
+  for (int axis = 0; axis < 3; ++axis) {
+    poseRow(levers, Eigen::Vector3d::Unit(axis), row);
+    columns.row(axis) = row.transpose();
   }
 }
 

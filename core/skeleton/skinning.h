@@ -31,6 +31,12 @@ class PosedSkin {
   /// follows the joint's vector through G_parent and the left Jacobian of SO(3).
   void poseDerivative(Eigen::Index vertex, Eigen::Ref<Eigen::Matrix3Xd> columns) const;
 
+  /// The same for any point of the surface and direction: d (direction . sum_c share_c x_c) / d (translation,
+  /// rotations). Adds a vertex with its share to `levers` (3 x J, zero to begin with); from the sum, poseRow makes the
+  /// row, 3 + 3 J numbers.
+  void addLevers(Eigen::Index vertex, double share, Eigen::Matrix3Xd& levers) const;
+  void poseRow(const Eigen::Matrix3Xd& levers, const Eigen::Vector3d& direction, Eigen::Ref<Eigen::VectorXd> row) const;
+
   /// How the joints' part of d x_i / d shape goes: for rest joints that change by `joint_modes` (3 J x k, joint by
   /// joint), what each bone's translation p_j - G_j r_j changes by, J matrices of 3 x k.
   std::vector<Eigen::Matrix3Xd> boneDerivatives(const Eigen::MatrixXd& joint_modes) const;

@@ -1,0 +1,158 @@
+#include "core/body/body_fit.h"
+
+#include <ceres/ceres.h>
+
+#include <cmath>
+
+#include "core/body/body_residuals.h"
+#include "core/numerics/error.h"
+
+namespace shaped {
+namespace {
+
+void requireTargets(std::span<const SurfaceTarget> targets, std::int32_t vertex_count) {
+  for (std::size_t i = 0; i < targets.size(); ++i) {
+    const auto& target = targets[i];
+    const std::string where = "targets[" + std::to_string(i) + "]";
+    for (const auto corner : target.corners)
+      if (corner < 0 || corner >= vertex_count)
+        throw InvalidInput(
+            where, "names vertex " + std::to_string(corner) + ", and the model has " + std::to_string(vertex_count));
+    if (!target.position.allFinite() || !target.normal.allFinite()) throw InvalidInput(where, "is not finite");
+    if (!(std::abs(target.barycentric.sum() - 1) < 1e-6)) throw InvalidInput(where, "has shares that do not sum to 1");
+    if (!(target.weight >= 0) || !std::isfinite(target.weight)) throw InvalidInput(where, "has a weight below 0");
+  }
+}
+
+/// Ends the solver when the stop token fires.
+class StopCallback : public ceres::IterationCallback {
+ public:
+  explicit StopCallback(std::stop_token stop) : stop_(std::move(stop)) {}
+  ceres::CallbackReturnType operator()(const ceres::IterationSummary&) override {
+    return stop_.stop_requested() ? ceres::SOLVER_ABORT : ceres::SOLVER_CONTINUE;
+  }
+
+ private:
+  std::stop_token stop_;
+};
+
+/// Forwards to the residuals, which outlive the problem.
+class Cost : public ceres::CostFunction {
+ public:
+  explicit Cost(const BodyResiduals& residuals) : residuals_(residuals) {
+    set_num_residuals(int(residuals.count()));
+    for (const Eigen::Index size : residuals.blockSizes()) mutable_parameter_block_sizes()->push_back(int(size));
+  }
+  bool Evaluate(double const* const* parameters, double* values, double** jacobians) const override {
+    return residuals_.evaluate(parameters, values, jacobians);
+  }
+
+ private:
+  const BodyResiduals& residuals_;
+};
+
+/// Keeps the joints (not the root) within the limits, and moves the start there.
+void applyLimits(ceres::Problem& problem, const JointLimits& limits, double* rotations) {
+  for (Eigen::Index i = 0; i < limits.low.size() - 3; ++i) {
+    const double low = limits.low.data()[3 + i], high = limits.high.data()[3 + i];
+    rotations[i] = std::clamp(rotations[i], low, high);
+    if (low > -1e6) problem.SetParameterLowerBound(rotations, int(i), low);
+    if (high < 1e6) problem.SetParameterUpperBound(rotations, int(i), high);
+  }
+}
+
+Outcome outcomeOf(const ceres::Solver::Summary& summary) {
+  Outcome outcome;
+  outcome.iterations = std::max(0, int(summary.iterations.size()) - 1);
+  if (summary.iterations.size() > 1) {
+    const auto& last = summary.iterations.back();
+    outcome.residual = std::abs(last.cost_change) / std::max(last.cost, 1e-300);
+  }
+  switch (summary.termination_type) {
+    case ceres::CONVERGENCE:
+      outcome.termination = Termination::kConverged;
+      break;
+    case ceres::NO_CONVERGENCE:
+      outcome.termination = Termination::kIterationLimit;
+      break;
+    case ceres::USER_FAILURE:
+      outcome.termination = Termination::kCancelled;
+      break;
+    default:
+      outcome.termination = Termination::kNumericalFailure;
+  }
+  return outcome;
+}
+
+ceres::Solver::Options solverOptions(const BodyFitOptions& options, ceres::IterationCallback* callback) {
+  ceres::Solver::Options solver;
+  solver.linear_solver_type = ceres::DENSE_NORMAL_CHOLESKY;
+  solver.max_num_iterations = options.max_iterations;
+  solver.function_tolerance = options.tolerance;
+  solver.gradient_tolerance = 0;
+  solver.parameter_tolerance = 1e-12;
+  solver.num_threads = 1;
+  solver.logging_type = ceres::SILENT;
+  solver.callbacks.push_back(callback);
+  return solver;
+}
+
+}  // namespace
+
+std::optional<std::string> BodyFitOptions::firstViolation() const {
+  const auto positive = [](const char* field, double value) -> std::optional<std::string> {
+    if (value > 0 && std::isfinite(value)) return std::nullopt;
+    return std::string(field) + " = " + std::to_string(value) + ", want > 0";
+  };
+  if (auto problem = positive("sigma", sigma)) return problem;
+  if (auto problem = positive("observations", observations)) return problem;
+  if (auto problem = positive("pose_deviation", pose_deviation)) return problem;
+  if (auto problem = positive("tolerance", tolerance)) return problem;
+  if (!(prior >= 0) || !std::isfinite(prior)) return "prior = " + std::to_string(prior) + ", want >= 0";
+  if (max_iterations < 1) return "max_iterations = " + std::to_string(max_iterations) + ", want >= 1";
+  return std::nullopt;
+}
+
+Solved<BodyState> fitBody(const BodyModel& model, const BodyState& start, std::span<const SurfaceTarget> targets,
+                          const BodyFitOptions& options) {
+  if (const auto problem = options.firstViolation()) throw InvalidInput("options", *problem);
+  requireTargets(targets, model.topology()->vertexCount());
+  model.posed(start);  // says what does not fit
+  BodyState state = start;
+  const BodyResiduals residuals(model, targets, options);
+  double* const identity = state.identity.data();
+  Eigen::Matrix<double, 6, 1> placement;
+  placement << state.pose.translation, state.pose.rotations.row(0).transpose();
+  double* const joints = state.pose.rotations.data() + 3;
+  const bool jointed = model.skeleton().jointCount() > 1;
+
+  ceres::Problem::Options ownership;
+  ownership.cost_function_ownership = ceres::DO_NOT_TAKE_OWNERSHIP;
+  ceres::Problem problem(ownership);
+  Cost cost(residuals);
+  std::vector<double*> blocks{identity, placement.data()};
+  if (jointed) blocks.push_back(joints);
+  problem.AddResidualBlock(&cost, nullptr, blocks);
+  if (jointed && options.limits && options.pose && model.parts().limits)
+    applyLimits(problem, *model.parts().limits, joints);
+  if (!options.identity) problem.SetParameterBlockConstant(identity);
+  if (!options.placement) problem.SetParameterBlockConstant(placement.data());
+  if (jointed && !options.pose) problem.SetParameterBlockConstant(joints);
+
+  StopCallback callback(options.stop);
+  ceres::Solver::Summary summary;
+  ceres::Solve(solverOptions(options, &callback), &problem, &summary);
+  state.pose.translation = placement.head<3>();
+  state.pose.rotations.row(0) = placement.tail<3>().transpose();
+  const Outcome outcome = outcomeOf(summary);
+  return {outcome.termination == Termination::kNumericalFailure ? start : state, outcome};
+}
+
+std::vector<SurfaceTarget> vertexTargets(const Vertices& shape) {
+  std::vector<SurfaceTarget> targets;
+  for (std::int32_t v = 0; v < shape.rows(); ++v)
+    targets.push_back({{v, v, v}, Eigen::Vector3d::UnitX(), shape.row(v).transpose()});
+  return targets;
+}
+
+}  // namespace shaped

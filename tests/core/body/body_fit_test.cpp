@@ -1,0 +1,151 @@
+#include "core/body/body_fit.h"
+
+#include <catch2/catch.hpp>
+
+#include "core/body/body_residuals.h"
+#include "core/mesh/quality.h"
+#include "core/numerics/error.h"
+#include "tests/support/bodies.h"
+
+using namespace shaped;
+using namespace shaped::test;
+
+namespace {
+
+/// Targets of both kinds on a posed body: points on faces, with and without a normal, of unequal weight.
+std::vector<SurfaceTarget> mixedTargets(const BodyModel& model, const Vertices& shape) {
+  std::vector<SurfaceTarget> targets;
+  const auto& faces = model.topology()->faces();
+  for (Eigen::Index f = 0; f < faces.rows(); f += 3) {
+    SurfaceTarget target{{faces(f, 0), faces(f, 1), faces(f, 2)}, {0.2, 0.3, 0.5}, Eigen::Vector3d::Zero()};
+    for (int c = 0; c < 3; ++c) target.position += target.barycentric[c] * shape.row(faces(f, c)).transpose();
+    if (f % 2) target.normal = Eigen::Vector3d(1, double(f % 5), -1).normalized();
+    target.weight = 0.5 + double(f % 4);
+    targets.push_back(target);
+  }
+  return targets;
+}
+
+}  // namespace
+
+TEST_CASE("derivatives of the body residuals meet central differences") {
+  const auto model = tubeModel(4, 10, 3);
+  const BodyState state{randomIdentity(model, 2), randomPose(model.skeleton(), 0.9, 3)};
+  const auto targets = mixedTargets(model, jitter(model.parts().mean, 0.1, 3));
+  const BodyResiduals residuals(model, targets, {});
+  const auto sizes = residuals.blockSizes();
+  std::vector<std::vector<double>> blocks;
+  blocks.emplace_back(state.identity.begin(), state.identity.end());
+  blocks.emplace_back(6);
+  std::copy_n(state.pose.translation.data(), 3, blocks[1].data());
+  std::copy_n(state.pose.rotations.data(), 3, blocks[1].data() + 3);
+  blocks.emplace_back(state.pose.rotations.data() + 3, state.pose.rotations.data() + state.pose.rotations.size());
+  const auto values = [&] {
+    const double* parameters[] = {blocks[0].data(), blocks[1].data(), blocks[2].data()};
+    Eigen::VectorXd result(residuals.count());
+    REQUIRE(residuals.evaluate(parameters, result.data(), nullptr));
+    return result;
+  };
+  using RowMajor = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>;
+  std::vector<RowMajor> jacobians;
+  for (const auto size : sizes) jacobians.push_back(RowMajor::Constant(residuals.count(), size, NAN));
+  {
+    const double* parameters[] = {blocks[0].data(), blocks[1].data(), blocks[2].data()};
+    double* wanted[] = {jacobians[0].data(), jacobians[1].data(), jacobians[2].data()};
+    Eigen::VectorXd ignored(residuals.count());
+    REQUIRE(residuals.evaluate(parameters, ignored.data(), wanted));
+  }
+  for (std::size_t b = 0; b < 3; ++b)
+    for (std::size_t c = 0; c < blocks[b].size(); ++c) {
+      const double at = blocks[b][c], step = 1e-4;
+      Eigen::VectorXd samples[4];
+      for (int s = 0; s < 4; ++s) {
+        blocks[b][c] = at + step * std::array{-2, -1, 1, 2}[std::size_t(s)];
+        samples[s] = values();
+      }
+      blocks[b][c] = at;
+      const Eigen::VectorXd expected = (8 * (samples[2] - samples[1]) - (samples[3] - samples[0])) / (12 * step);
+      const double scale = jacobians[b].cwiseAbs().maxCoeff();
+      CHECK((jacobians[b].col(Eigen::Index(c)) - expected).cwiseAbs().maxCoeff() < 1e-8 * scale);
+    }
+}
+
+TEST_CASE("fitting a body recovers identity and pose from its own vertices") {
+  const auto model = tubeModel(4, 10, 3);
+  const BodyState truth{randomIdentity(model, 4), randomPose(model.skeleton(), 0.5, 6)};
+  BodyFitOptions options;
+  options.prior = 1e-6;
+  options.tolerance = 1e-12;
+  const auto fit = fitBody(model, model.meanState(), vertexTargets(model.posed(truth).vertices()), options);
+  CHECK(fit.converged());
+  CHECK(maxVertexDistance(model.posed(fit.solution).vertices(), model.posed(truth).vertices()) < 1e-5);
+  CHECK((fit.solution.identity - truth.identity).cwiseAbs().maxCoeff() < 1e-3);
+}
+
+TEST_CASE("the identity's prior pulls to the mean, the more the fewer observations count") {
+  const auto model = tubeModel(4, 10, 3);
+  const BodyState truth{Eigen::Vector3d(2, -1.5, 1), restPose(model.skeleton())};
+  const auto targets = vertexTargets(model.posed(truth).vertices());
+  BodyFitOptions options;
+  double last = 1e9;
+  for (const double observations : {1000.0, 1.0, 1e-3, 1e-6}) {
+    options.observations = observations;
+    const double length = fitBody(model, model.meanState(), targets, options).solution.identity.norm();
+    CHECK(length < last);
+    last = length;
+  }
+  CHECK(last < 0.1);
+  CHECK(fitBody(model, truth, {}).solution.identity.norm() < 1e-6);
+}
+
+TEST_CASE("parts of a state that are held do not move, and joints stay within their limits") {
+  auto parts = tubeModel(4, 10, 3).parts();
+  parts.limits = JointLimits{Vertices::Constant(6, 3, -0.1), Vertices::Constant(6, 3, 0.2)};
+  const BodyModel model(parts);
+  const BodyState truth{randomIdentity(model, 4), randomPose(model.skeleton(), 0.8, 6)};
+  const auto targets = vertexTargets(model.posed(truth).vertices());
+  BodyFitOptions options;
+  const auto limited = fitBody(model, model.meanState(), targets, options).solution.pose.rotations;
+  CHECK(limited.bottomRows(5).maxCoeff() <= 0.2);
+  CHECK(limited.bottomRows(5).minCoeff() >= -0.1);
+  CHECK(limited.bottomRows(5).maxCoeff() > 0.19);  // they would like to go further
+  options.limits = false;
+  CHECK(fitBody(model, model.meanState(), targets, options).solution.pose.rotations.cwiseAbs().maxCoeff() > 0.25);
+  options.pose = false;
+  CHECK(fitBody(model, model.meanState(), targets, options).solution.pose.rotations.bottomRows(5).norm() == 0);
+  options.identity = false;
+  options.placement = false;
+  const auto held = fitBody(model, model.meanState(), targets, options).solution;
+  CHECK(held.identity.norm() == 0);
+  CHECK(held.pose.rotations.norm() == 0);
+}
+
+TEST_CASE("a body fit says how it ended") {
+  const auto model = tubeModel(4, 10, 3);
+  const BodyState truth{randomIdentity(model, 4), randomPose(model.skeleton(), 0.5, 6)};
+  const auto targets = vertexTargets(model.posed(truth).vertices());
+  BodyFitOptions options;
+  options.max_iterations = 1;
+  const auto short_fit = fitBody(model, model.meanState(), targets, options);
+  CHECK(short_fit.termination == Termination::kIterationLimit);
+  CHECK(short_fit.residual > options.tolerance);
+  std::stop_source source;
+  source.request_stop();
+  options.stop = source.get_token();
+  CHECK(fitBody(model, model.meanState(), targets, options).termination == Termination::kCancelled);
+}
+
+TEST_CASE("a body fit refuses targets that the model does not have") {
+  const auto model = tubeModel(3, 10, 2);
+  std::vector<SurfaceTarget> targets{{{0, 0, 0}, {1, 0, 0}, {0, 0, 0}}};
+  targets[0].corners[1] = 100000;
+  CHECK_THROWS_WITH(fitBody(model, model.meanState(), targets), Catch::Contains("targets[0]: names vertex 100000"));
+  targets[0] = {{0, 0, 0}, {0.5, 0, 0}, {0, 0, 0}};
+  CHECK_THROWS_WITH(fitBody(model, model.meanState(), targets),
+                    Catch::Contains("targets[0]: has shares that do not sum"));
+  targets[0] = {{0, 0, 0}, {1, 0, 0}, {NAN, 0, 0}};
+  CHECK_THROWS_WITH(fitBody(model, model.meanState(), targets), Catch::Contains("targets[0]: is not finite"));
+  BodyFitOptions options;
+  options.sigma = 0;
+  CHECK_THROWS_WITH(fitBody(model, model.meanState(), {}, options), Catch::Contains("sigma = 0"));
+}
