@@ -118,14 +118,6 @@ class FrameReader {
   std::size_t channels_ = 0, frame_ = 0;
 };
 
-/// Joints without channels cost memory in every frame and no byte of the file: a small one could ask for gigabytes.
-void requireFilledFrames(const TextScanner& scanner, std::size_t frames, std::size_t joints, std::size_t bytes) {
-  constexpr std::size_t most_omitted = 1 << 24;
-  if (frames * joints > bytes + most_omitted)
-    scanner.fail("frames of " + std::to_string(joints) + " joints leave out more than " + std::to_string(most_omitted) +
-                 " channels; give every joint its rotation");
-}
-
 }  // namespace
 
 MotionClip parseBvh(const std::string& file, std::string_view text, double metres_per_unit) {

@@ -1,6 +1,9 @@
 #pragma once
 
 #include <Eigen/Core>
+#include <cstddef>
+
+#include "core/io/text_scanner.h"
 
 namespace shaped {
 
@@ -12,5 +15,9 @@ struct MotionChannel {
 
 /// The rotation about a coordinate axis, right-handed.
 Eigen::Matrix3d axisTurn(int axis, double radians);
+
+/// Fails at the scanner's line when a motion of `bytes` bytes has more than 2^24 joints in its frames that it says
+/// nothing of: joints without channels would make gigabytes of a small file. frames: those met so far.
+void requireFilledFrames(const TextScanner& scanner, std::size_t frames, std::size_t joints, std::size_t bytes);
 
 }  // namespace shaped
