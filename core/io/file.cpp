@@ -5,6 +5,7 @@
 #include <unistd.h>
 
 #include <atomic>
+#include <cctype>
 #include <cerrno>
 #include <cstring>
 #include <system_error>
@@ -47,6 +48,12 @@ int writeAll(int descriptor, std::string_view bytes) {
 }
 
 }  // namespace
+
+std::string extensionOf(const std::filesystem::path& path) {
+  std::string extension = path.extension().string();
+  for (char& c : extension) c = static_cast<char>(std::tolower(static_cast<unsigned char>(c)));
+  return extension;
+}
 
 std::string readFile(const fs::path& path) {
   // Not blocking, so that a pipe without a writer is refused instead of waited for.

@@ -7,6 +7,9 @@
 
 namespace shaped {
 
+/// The extension of a path in lower case, with its dot (".ply"); empty where there is none.
+std::string extensionOf(const std::filesystem::path& path);
+
 /// The whole content of a regular file. Throws InvalidInput naming the file when it cannot be opened, is not a regular
 /// file or is empty; FileError when reading fails half-way.
 std::string readFile(const std::filesystem::path& path);

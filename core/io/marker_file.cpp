@@ -1,7 +1,6 @@
 #include "core/io/marker_file.h"
 
 #include <algorithm>
-#include <cctype>
 
 #include "core/io/c3d.h"
 #include "core/io/file.h"
@@ -13,12 +12,6 @@
 
 namespace shaped {
 namespace {
-
-std::string extensionOf(const std::filesystem::path& path) {
-  std::string extension = path.extension().string();
-  for (char& c : extension) c = static_cast<char>(std::tolower(static_cast<unsigned char>(c)));
-  return extension;
-}
 
 MarkerTrial readNpyMarkers(const std::filesystem::path& path, std::span<const std::string> labels) {
   const FrameReader reader(path);

@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <array>
-#include <cctype>
 
 #include "core/io/file.h"
 #include "core/io/mesh_formats.h"
@@ -13,7 +12,7 @@ namespace {
 
 struct Format {
   std::string_view extension;
-  MeshFile (*parse)(const std::string& file, std::string_view bytes);
+  void (*parse)(const std::string& file, std::string_view bytes, PolygonSoup& soup);
   std::string (*format)(const Vertices& vertices, const Faces& faces);
 };
 
@@ -21,8 +20,7 @@ constexpr std::array kFormats{Format{".obj", parseObj, formatObj}, Format{".off"
                               Format{".ply", parsePly, formatPly}, Format{".stl", parseStl, formatStl}};
 
 const Format& formatOf(const std::filesystem::path& path) {
-  std::string extension = path.extension().string();
-  for (char& c : extension) c = static_cast<char>(std::tolower(static_cast<unsigned char>(c)));
+  const auto extension = extensionOf(path);
   const auto* found = std::find_if(kFormats.begin(), kFormats.end(),
                                    [&](const Format& format) { return format.extension == extension; });
   if (found == kFormats.end())
@@ -33,6 +31,12 @@ const Format& formatOf(const std::filesystem::path& path) {
 void requireWritable(const std::string& file, const Vertices& vertices, const Faces& faces) {
   if (vertices.rows() == 0) throw InvalidInput(file, "no vertices to write");
   if (faces.rows() == 0) throw InvalidInput(file, "no faces to write");
+  requireSound(file, vertices, faces);
+}
+
+}  // namespace
+
+void requireSound(const std::string& file, const Vertices& vertices, const Faces& faces) {
   for (Eigen::Index v = 0; v < vertices.rows(); ++v)
     if (!vertices.row(v).allFinite())
       throw InvalidInput(file, "vertex " + std::to_string(v) + " has a coordinate that is not a finite number");
@@ -42,11 +46,11 @@ void requireWritable(const std::string& file, const Vertices& vertices, const Fa
                                    std::to_string(vertices.rows()) + ")");
 }
 
-}  // namespace
-
 MeshFile readMesh(const std::filesystem::path& path) {
   const auto& format = formatOf(path);
-  return format.parse(path.string(), readFile(path));
+  PolygonSoup soup(path.string());
+  format.parse(path.string(), readFile(path), soup);
+  return soup.finishMesh();
 }
 
 void writeMesh(const std::filesystem::path& path, const Vertices& vertices, const Faces& faces) {

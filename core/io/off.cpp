@@ -6,8 +6,9 @@
 namespace shaped {
 namespace {
 
-/// The keyword line: [ST][C][N]OFF. Normals, colours and texture coordinates follow x, y, z in a vertex's line.
-void requireKeyword(TextScanner& scanner, const std::string& file) {
+/// The keyword line: [ST][C][N]OFF. Normals, colours and texture coordinates follow x, y, z in a vertex's line, in
+/// that order. True when there are normals.
+bool readKeyword(TextScanner& scanner, const std::string& file) {
   if (!scanner.nextContentLine('#')) throw InvalidInput(file, "holds nothing but blanks and comments");
   auto keyword = scanner.word();
   const auto whole = keyword;
@@ -15,6 +16,7 @@ void requireKeyword(TextScanner& scanner, const std::string& file) {
     if (keyword.starts_with(prefix)) keyword.remove_prefix(prefix.size());
   if (keyword != "OFF")
     scanner.fail(quotedWord(whole) + " is not the keyword of a three-dimensional OFF file; want OFF");
+  return whole.ends_with("NOFF");
 }
 
 void nextLineOf(TextScanner& scanner, const char* element, std::int64_t index, std::int64_t count,
@@ -26,9 +28,9 @@ void nextLineOf(TextScanner& scanner, const char* element, std::int64_t index, s
 
 }  // namespace
 
-MeshFile parseOff(const std::string& file, std::string_view text) {
+void parseOff(const std::string& file, std::string_view text, PolygonSoup& soup) {
   TextScanner scanner(file, text);
-  requireKeyword(scanner, file);
+  const bool with_normals = readKeyword(scanner, file) && soup.keepsNormals();
   if (scanner.restOfLine().find_first_not_of(" \t") == std::string_view::npos && !scanner.nextContentLine('#'))
     throw InvalidInput(file, "is truncated: ends before its counts");
   if (scanner.restOfLine().find("BINARY") != std::string_view::npos)
@@ -36,11 +38,13 @@ MeshFile parseOff(const std::string& file, std::string_view text) {
   const auto vertex_count = scanner.integer("the number of vertices");
   const auto face_count = scanner.integer("the number of faces");
   if (vertex_count < 0 || face_count < 0) scanner.fail("a count is negative");
-  PolygonSoup soup(file);
   for (std::int64_t v = 0; v < vertex_count; ++v) {
     nextLineOf(scanner, "vertex", v, vertex_count, file);
     const double x = scanner.number("x"), y = scanner.number("y"), z = scanner.number("z");
     soup.addVertex(x, y, z);
+    if (!with_normals) continue;
+    const double nx = scanner.number("nx"), ny = scanner.number("ny"), nz = scanner.number("nz");
+    soup.addNormal(nx, ny, nz);
   }
   std::vector<std::int64_t> corners;
   for (std::int64_t f = 0; f < face_count; ++f) {
@@ -53,7 +57,6 @@ MeshFile parseOff(const std::string& file, std::string_view text) {
   if (scanner.nextContentLine('#'))
     scanner.fail("the file goes on after the " + std::to_string(vertex_count) + " vertices and " +
                  std::to_string(face_count) + " faces its header promises");
-  return soup.finish();
 }
 
 std::string formatOff(const Vertices& vertices, const Faces& faces) {

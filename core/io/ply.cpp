@@ -1,5 +1,7 @@
+#include <algorithm>
 #include <array>
 #include <cmath>
+#include <optional>
 
 #include "core/io/byte_reader.h"
 #include "core/io/mesh_formats.h"
@@ -94,23 +96,38 @@ void readList(const std::string& file, Body& body, const PlyProperty& property, 
   for (std::int64_t i = 0; i < count; ++i) values.push_back(body.number(property.type));
 }
 
-/// Where x, y and z stand among a vertex's properties.
-std::array<std::size_t, 3> coordinateProperties(const std::string& file, const PlyElement& element) {
-  std::array<std::size_t, 3> places;
+/// Where three numbers of a vertex stand among its properties.
+using Places = std::array<std::size_t, 3>;
+
+std::size_t placeOf(const PlyElement& element, std::string_view name) {
+  const auto& properties = element.properties;
+  const auto found = std::find_if(properties.begin(), properties.end(),
+                                  [&](const PlyProperty& p) { return p.name == name && !p.is_list; });
+  return static_cast<std::size_t>(found - properties.begin());
+}
+
+Places placesOf(const std::string& file, const PlyElement& element, const std::array<std::string_view, 3>& names) {
+  Places places;
   for (std::size_t axis = 0; axis < 3; ++axis) {
-    const std::string name(1, static_cast<char>('x' + axis));
-    auto& place = places[axis] = 0;
-    while (place < element.properties.size() &&
-           (element.properties[place].name != name || element.properties[place].is_list))
-      ++place;
-    if (place == element.properties.size()) throw InvalidInput(file, "has vertices without the property " + name);
+    places[axis] = placeOf(element, names[axis]);
+    if (places[axis] == element.properties.size())
+      throw InvalidInput(file, "has vertices without the property " + std::string(names[axis]));
   }
   return places;
 }
 
+/// Nothing when no normal is wanted or none is there; half a normal is refused.
+std::optional<Places> normalPlaces(const std::string& file, const PlyElement& element, const PolygonSoup& soup) {
+  constexpr std::array<std::string_view, 3> names{"nx", "ny", "nz"};
+  const auto has = [&](std::string_view name) { return placeOf(element, name) < element.properties.size(); };
+  if (!soup.keepsNormals() || std::none_of(names.begin(), names.end(), has)) return std::nullopt;
+  return placesOf(file, element, names);
+}
+
 template <class Body>
 void readVertices(const std::string& file, Body& body, const PlyElement& element, PolygonSoup& soup) {
-  const auto places = coordinateProperties(file, element);
+  const auto places = placesOf(file, element, {"x", "y", "z"});
+  const auto normal = normalPlaces(file, element, soup);
   std::vector<double> values(element.properties.size()), list;
   for (std::int64_t i = 0; i < element.count; ++i) {
     for (std::size_t p = 0; p < values.size(); ++p) {
@@ -121,6 +138,7 @@ void readVertices(const std::string& file, Body& body, const PlyElement& element
         values[p] = body.number(property.type);
     }
     soup.addVertex(values[places[0]], values[places[1]], values[places[2]]);
+    if (normal) soup.addNormal(values[(*normal)[0]], values[(*normal)[1]], values[(*normal)[2]]);
   }
 }
 
@@ -146,8 +164,7 @@ void readOther(const std::string& file, Body& body, const PlyElement& element, P
 }
 
 template <class Body>
-MeshFile readBody(const std::string& file, Body body, const PlyHeader& header) {
-  PolygonSoup soup(file);
+void readBody(const std::string& file, Body body, const PlyHeader& header, PolygonSoup& soup) {
   for (const auto& element : header.elements) {
     if (element.name == "vertex")
       readVertices(file, body, element, soup);
@@ -155,25 +172,33 @@ MeshFile readBody(const std::string& file, Body body, const PlyHeader& header) {
       readOther(file, body, element, soup);
   }
   body.requireEnd();
-  return soup.finish();
 }
 
 }  // namespace
 
-MeshFile parsePly(const std::string& file, std::string_view bytes) {
+void parsePly(const std::string& file, std::string_view bytes, PolygonSoup& soup) {
   const auto header = parsePlyHeader(file, bytes);
   const auto data = bytes.substr(header.size);
-  if (header.encoding == PlyEncoding::kAscii) return readBody(file, AsciiBody(file, data), header);
+  if (header.encoding == PlyEncoding::kAscii) return readBody(file, AsciiBody(file, data), header, soup);
   const auto order = header.encoding == PlyEncoding::kLittleEndian ? std::endian::little : std::endian::big;
-  return readBody(file, BinaryBody(file, data, order), header);
+  return readBody(file, BinaryBody(file, data, order), header, soup);
 }
 
-std::string formatPly(const Vertices& vertices, const Faces& faces) {
-  std::string bytes = "ply\nformat binary_little_endian 1.0\nelement vertex " + std::to_string(vertices.rows()) +
-                      "\nproperty double x\nproperty double y\nproperty double z\nelement face " +
-                      std::to_string(faces.rows()) + "\nproperty list uchar int vertex_indices\nend_header\n";
-  for (const auto& v : vertices.rowwise())
-    for (const double x : v) appendNumber(bytes, x, std::endian::little);
+std::string formatPly(const Vertices& vertices, const Faces& faces) { return formatPlyScan(vertices, {}, faces); }
+
+std::string formatPlyScan(const Vertices& points, const Vertices& normals, const Faces& faces) {
+  std::string bytes = "ply\nformat binary_little_endian 1.0\nelement vertex " + std::to_string(points.rows()) + "\n";
+  for (const char* name : {"x", "y", "z"}) bytes += "property double " + std::string(name) + "\n";
+  if (normals.rows() > 0)
+    for (const char* name : {"nx", "ny", "nz"}) bytes += "property double " + std::string(name) + "\n";
+  if (faces.rows() > 0)
+    bytes += "element face " + std::to_string(faces.rows()) + "\nproperty list uchar int vertex_indices\n";
+  bytes += "end_header\n";
+  for (Eigen::Index v = 0; v < points.rows(); ++v) {
+    for (const double x : points.row(v)) appendNumber(bytes, x, std::endian::little);
+    if (normals.rows() == 0) continue;
+    for (const double x : normals.row(v)) appendNumber(bytes, x, std::endian::little);
+  }
   for (const auto& f : faces.rowwise()) {
     appendNumber(bytes, std::uint8_t{3}, std::endian::little);
     for (const std::int32_t corner : f) appendNumber(bytes, corner, std::endian::little);

@@ -40,15 +40,49 @@ void PolygonSoup::addPolygon(std::span<const std::int64_t> corners) {
   ++polygon_count_;
 }
 
-MeshFile PolygonSoup::finish() {
+void PolygonSoup::addNormal(double x, double y, double z) {
+  const auto refuse = [&](const char* problem) {
+    throw InvalidInput(file_, "vertex " + std::to_string(normals_.size() / 3) + " has a normal " + problem);
+  };
+  Eigen::Vector3d normal(x, y, z);
+  if (!normal.allFinite()) refuse("that is not finite");
+  const double largest = normal.cwiseAbs().maxCoeff();
+  if (largest == 0) refuse("of length zero");
+  // What is of unit length to rounding stays as it is, so that files read back exactly.
+  if (!(std::abs(normal.squaredNorm() - 1) < 1e-14)) normal = (normal / largest).normalized();
+  normals_.insert(normals_.end(), normal.begin(), normal.end());
+}
+
+MeshFile PolygonSoup::finishMesh() {
   if (coordinates_.empty()) throw InvalidInput(file_, "has no vertices");
   if (triangles_.empty()) throw InvalidInput(file_, "has no faces; a mesh is needed, not a point cloud");
-  if (largest_corner_ >= vertexCount())
-    throw InvalidInput(file_, badCorner(polygon_of_largest_, largest_corner_, vertexCount()));
-  MeshFile mesh{Eigen::Map<const Vertices>(coordinates_.data(), vertexCount(), 3),
-                Eigen::Map<const Faces>(triangles_.data(), static_cast<Eigen::Index>(triangles_.size() / 3), 3)};
+  requireCorners();
+  MeshFile mesh{vertices(), faces()};
   *this = PolygonSoup(file_);
   return mesh;
+}
+
+Scan PolygonSoup::finishScan() {
+  if (coordinates_.empty()) throw InvalidInput(file_, "has no points");
+  if (!normals_.empty() && normals_.size() != coordinates_.size())
+    throw InvalidInput(file_, "has " + std::to_string(normals_.size() / 3) + " normals for " +
+                                  std::to_string(vertexCount()) + " points");
+  requireCorners();
+  Scan scan{vertices(), Eigen::Map<const Vertices>(normals_.data(), static_cast<Eigen::Index>(normals_.size() / 3), 3),
+            faces()};
+  *this = PolygonSoup(file_, FileNormals::kKept);
+  return scan;
+}
+
+void PolygonSoup::requireCorners() const {
+  if (largest_corner_ >= vertexCount())
+    throw InvalidInput(file_, badCorner(polygon_of_largest_, largest_corner_, vertexCount()));
+}
+
+Vertices PolygonSoup::vertices() const { return Eigen::Map<const Vertices>(coordinates_.data(), vertexCount(), 3); }
+
+Faces PolygonSoup::faces() const {
+  return Eigen::Map<const Faces>(triangles_.data(), static_cast<Eigen::Index>(triangles_.size() / 3), 3);
 }
 
 }  // namespace shaped

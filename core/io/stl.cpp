@@ -18,7 +18,7 @@ constexpr std::size_t kHeaderBytes = 84, kFacetBytes = 50;
 /// Receives loose triangles and gives equal positions one number. -0 equals 0, as in every comparison of numbers.
 class Welder {
  public:
-  explicit Welder(const std::string& file) : soup_(file) {}
+  explicit Welder(PolygonSoup& soup) : soup_(soup) {}
 
   void addFacet(const std::array<std::array<double, 3>, 3>& corners) {
     std::array<std::int64_t, 3> indices;
@@ -35,22 +35,19 @@ class Welder {
     soup_.addPolygon(indices);
   }
 
-  MeshFile finish() { return soup_.finish(); }
-
  private:
-  PolygonSoup soup_;
+  PolygonSoup& soup_;
   std::map<std::array<double, 3>, std::int64_t> numbers_;
 };
 
-MeshFile parseBinary(const std::string& file, std::string_view bytes) {
-  Welder welder(file);
+void parseBinary(std::string_view bytes, PolygonSoup& soup) {
+  Welder welder(soup);
   for (bytes.remove_prefix(kHeaderBytes); !bytes.empty(); bytes.remove_prefix(kFacetBytes)) {
     std::array<std::array<double, 3>, 3> corners;
     for (std::size_t i = 0; i < 9; ++i)  // after the normal's twelve bytes
       corners[i / 3][i % 3] = loadNumber<float>(bytes.data() + 12 + 4 * i, std::endian::little);
     welder.addFacet(corners);
   }
-  return welder.finish();
 }
 
 std::string lowerCase(std::string_view word) {
@@ -87,9 +84,9 @@ void readFacet(TextScanner& scanner, const std::string& file, Welder& welder) {
 }
 
 /// One or more solids; the rest of the lines of "solid" and "endsolid" is their name.
-MeshFile parseText(const std::string& file, std::string_view text) {
+void parseText(const std::string& file, std::string_view text, PolygonSoup& soup) {
   TextScanner scanner(file, text);
-  Welder welder(file);
+  Welder welder(soup);
   bool inside = false;
   while (scanner.nextLine()) {
     const auto word = scanner.word();
@@ -103,22 +100,21 @@ MeshFile parseText(const std::string& file, std::string_view text) {
       scanner.fail(quotedWord(word) + " stands where '" + (inside ? "facet' or 'endsolid" : "solid") + "' should");
   }
   if (inside) throw InvalidInput(file, "is truncated: ends without 'endsolid'");
-  return welder.finish();
 }
 
 }  // namespace
 
-MeshFile parseStl(const std::string& file, std::string_view bytes) {
+void parseStl(const std::string& file, std::string_view bytes, PolygonSoup& soup) {
   // Binary files may begin with "solid" too, so the length decides.
   if (bytes.size() >= kHeaderBytes) {
     const auto count = loadNumber<std::uint32_t>(bytes.data() + 80, std::endian::little);
     const auto size = kHeaderBytes + kFacetBytes * std::uint64_t{count};
-    if (bytes.size() == size) return parseBinary(file, bytes);
+    if (bytes.size() == size) return parseBinary(bytes, soup);
     if (!bytes.starts_with("solid"))
       throw InvalidInput(file, "is " + std::to_string(bytes.size()) + " bytes long, but a binary STL of " +
                                    std::to_string(count) + " facets has " + std::to_string(size));
   }
-  return parseText(file, bytes);
+  return parseText(file, bytes, soup);
 }
 
 std::string formatStl(const Vertices& vertices, const Faces& faces) {
