@@ -4,103 +4,118 @@
 
 namespace shaped {
 
-/// The blocks that are wanted; the others are empty.
-struct BodyResiduals::Jacobians {
-  using Block = Eigen::Map<RowMajor>;
-  Block identity, placement, joints;
+/// Writes the rows of targets for one state.
+class BodyResiduals::TargetRows {
+ public:
+  TargetRows(const BodyResiduals& residuals, const BodyState& state)
+      : residuals_(residuals),
+        skin_(residuals.model_.posed(state)),
+        bones_(skin_.boneDerivatives(residuals.model_.jointModes())),
+        levers_(3, residuals.model_.skeleton().jointCount()),
+        shape_(3, residuals.model_.modeCount()) {}
 
-  bool pose() const { return placement.size() > 0 || joints.size() > 0; }
+  /// Fills residuals_.rowCount(target) rows.
+  void fill(const SurfaceTarget& target, Eigen::Ref<Rows> rows) {
+    Eigen::Vector3d offset = -target.position;
+    levers_.setZero();
+    shape_.setZero();
+    for (int c = 0; c < 3; ++c)
+      if (target.barycentric[c] != 0) addCorner(target.corners[std::size_t(c)], target.barycentric[c], offset);
+    const double scale = residuals_.scale_ * std::sqrt(target.weight);
+    for (Eigen::Index row = 0; row < rows.rows(); ++row) {
+      const bool along = rows.rows() == 1;
+      const Eigen::Vector3d direction = scale * (along ? target.normal : Eigen::Vector3d(Eigen::Vector3d::Unit(row)));
+      const Eigen::Index modes = shape_.cols(), last = rows.cols() - 1;
+      rows.row(row).head(modes) = direction.transpose() * shape_;
+      skin_.poseRow(levers_, direction, rows.row(row).segment(modes, last - modes));
+      rows(row, last) = direction.dot(offset);
+    }
+  }
+
+ private:
+  void addCorner(std::int32_t corner, double share, Eigen::Vector3d& offset) {
+    offset += share * skin_.vertices().row(corner).transpose();
+    skin_.addLevers(corner, share, levers_);
+    shape_ += share * skin_.shapeDerivative(corner, residuals_.model_.vertexModes(corner), bones_);
+  }
+
+  const BodyResiduals& residuals_;
+  PosedSkin skin_;
+  std::vector<Eigen::Matrix3Xd> bones_;
+  Eigen::Matrix3Xd levers_, shape_;
 };
 
 BodyResiduals::BodyResiduals(const BodyModel& model, std::span<const SurfaceTarget> targets,
                              const BodyFitOptions& options)
-    : model_(model), targets_(targets), joint_size_(3 * model.skeleton().jointCount() - 3) {
+    : model_(model), targets_(targets), parameters_(model.modeCount() + 3 + 3 * model.skeleton().jointCount()) {
   double weights = 0;
-  for (const auto& target : targets) {
-    weights += target.weight;
-    target_rows_ += target.normal.isZero(0) ? 3 : 1;
-  }
-  prior_rows_ = model.modeCount() + joint_size_;
+  for (const auto& target : targets) weights += target.weight;
   scale_ = weights > 0 ? std::sqrt(options.observations / weights) / options.sigma : 0;
   identity_prior_ = std::sqrt(options.prior);
   joint_prior_ = std::sqrt(options.prior) / options.pose_deviation;
 }
 
-std::vector<Eigen::Index> BodyResiduals::blockSizes() const {
-  if (joint_size_ == 0) return {model_.modeCount(), 6};
-  return {model_.modeCount(), 6, joint_size_};
+Eigen::VectorXd BodyResiduals::priorFactors() const {
+  Eigen::VectorXd factors = Eigen::VectorXd::Constant(parameters_, joint_prior_);
+  factors.head(model_.modeCount()).setConstant(identity_prior_);
+  factors.segment<6>(model_.modeCount()).setZero();
+  return factors;
 }
 
-BodyState BodyResiduals::stateOf(double const* const* parameters) const {
-  BodyState state{Eigen::Map<const Eigen::VectorXd>(parameters[0], model_.modeCount()), restPose(model_.skeleton())};
-  state.pose.translation = Eigen::Map<const Eigen::Vector3d>(parameters[1]);
-  state.pose.rotations.row(0) = Eigen::Map<const Eigen::RowVector3d>(parameters[1] + 3);
-  if (joint_size_ > 0) std::copy_n(parameters[2], joint_size_, state.pose.rotations.data() + 3);
-  return state;
+Eigen::VectorXd BodyResiduals::priorValues(const BodyState& state) const {
+  Eigen::VectorXd values(parameters_);
+  values << state.identity, toVector(state.pose);
+  return priorFactors().cwiseProduct(values);
 }
 
-bool BodyResiduals::evaluate(double const* const* parameters, double* values, double** jacobians) const {
-  const BodyState state = stateOf(parameters);
-  if (!state.identity.allFinite() || !state.pose.translation.allFinite() || !state.pose.rotations.allFinite())
-    return false;
+double BodyResiduals::energy(const BodyState& state) const {
   const PosedSkin skin = model_.posed(state);
-  const auto block = [&](int index, Eigen::Index size) -> Jacobians::Block {
-    const bool wanted = jacobians && size > 0 && jacobians[index];
-    return {wanted ? jacobians[index] : nullptr, wanted ? count() : 0, wanted ? size : 0};
-  };
-  Jacobians wanted{block(0, model_.modeCount()), block(1, 6), block(2, joint_size_)};
-  addTargets(skin, values, jacobians ? &wanted : nullptr);
-  addPriors(state, values, jacobians ? &wanted : nullptr);
-  return true;
-}
-
-void BodyResiduals::addTargets(const PosedSkin& skin, double* values, Jacobians* jacobians) const {
-  const bool identity = jacobians && jacobians->identity.size() > 0, pose = jacobians && jacobians->pose();
-  const auto bones = identity ? skin.boneDerivatives(model_.jointModes()) : std::vector<Eigen::Matrix3Xd>();
-  Eigen::Matrix3Xd levers(3, model_.skeleton().jointCount()), shape(3, model_.modeCount());
-  Eigen::VectorXd turns(6 + joint_size_);
-  Eigen::Index row = 0;
+  double sum = priorValues(state).squaredNorm();
   for (const auto& target : targets_) {
     Eigen::Vector3d offset = -target.position;
-    if (pose) levers.setZero();
-    if (identity) shape.setZero();
-    for (int c = 0; c < 3; ++c) {
-      const double share = target.barycentric[c];
-      if (share == 0) continue;
-      const std::int32_t corner = target.corners[std::size_t(c)];
-      offset += share * skin.vertices().row(corner).transpose();
-      if (pose) skin.addLevers(corner, share, levers);
-      if (identity) shape += share * skin.shapeDerivative(corner, model_.vertexModes(corner), bones);
-    }
-    const double scale = scale_ * std::sqrt(target.weight);
-    const bool along = !target.normal.isZero(0);
-    for (int axis = 0; axis < (along ? 1 : 3); ++axis, ++row) {
-      const Eigen::Vector3d direction = scale * (along ? target.normal : Eigen::Vector3d(Eigen::Vector3d::Unit(axis)));
-      values[row] = direction.dot(offset);
-      if (identity) jacobians->identity.row(row) = direction.transpose() * shape;
-      if (!pose) continue;
-      skin.poseRow(levers, direction, turns);
-      if (jacobians->placement.size() > 0) jacobians->placement.row(row) = turns.head<6>().transpose();
-      if (jacobians->joints.size() > 0) jacobians->joints.row(row) = turns.tail(joint_size_).transpose();
-    }
+    for (int c = 0; c < 3; ++c)
+      offset += target.barycentric[c] * skin.vertices().row(target.corners[std::size_t(c)]).transpose();
+    const double squared = rowCount(target) == 1 ? std::pow(target.normal.dot(offset), 2) : offset.squaredNorm();
+    sum += scale_ * scale_ * target.weight * squared;
   }
+  return sum;
 }
 
-void BodyResiduals::addPriors(const BodyState& state, double* values, Jacobians* jacobians) const {
-  const Eigen::Index modes = model_.modeCount(), first = target_rows_, joints = target_rows_ + modes;
-  Eigen::Map<Eigen::VectorXd>(values + first, modes) = identity_prior_ * state.identity;
-  Eigen::Map<Eigen::VectorXd>(values + joints, joint_size_) =
-      joint_prior_ * Eigen::Map<const Eigen::VectorXd>(state.pose.rotations.data() + 3, joint_size_);
-  if (!jacobians) return;
-  if (jacobians->placement.size() > 0) jacobians->placement.bottomRows(prior_rows_).setZero();
-  if (jacobians->identity.size() > 0) {
-    jacobians->identity.bottomRows(prior_rows_).setZero();
-    jacobians->identity.block(first, 0, modes, modes).diagonal().setConstant(identity_prior_);
+BodyResiduals::Rows BodyResiduals::rows(const BodyState& state) const {
+  Eigen::Index count = parameters_;
+  for (const auto& target : targets_) count += rowCount(target);
+  Rows all(count, parameters_ + 1);
+  TargetRows writer(*this, state);
+  Eigen::Index row = 0;
+  for (const auto& target : targets_) {
+    writer.fill(target, all.middleRows(row, rowCount(target)));
+    row += rowCount(target);
   }
-  if (jacobians->joints.size() > 0) {
-    jacobians->joints.bottomRows(prior_rows_).setZero();
-    jacobians->joints.block(joints, 0, joint_size_, joint_size_).diagonal().setConstant(joint_prior_);
+  all.bottomRows(parameters_) << Eigen::MatrixXd(priorFactors().asDiagonal()), priorValues(state);
+  return all;
+}
+
+Eigen::MatrixXd BodyResiduals::squares(const BodyState& state) const {
+  constexpr Eigen::Index batch = 192;  // rows that stay in the cache
+  Eigen::MatrixXd sums = Eigen::MatrixXd::Zero(parameters_ + 1, parameters_ + 1);
+  Rows rows(batch, parameters_ + 1);
+  TargetRows writer(*this, state);
+  Eigen::Index filled = 0;
+  const auto flush = [&] {
+    sums.selfadjointView<Eigen::Lower>().rankUpdate(rows.topRows(filled).transpose());
+    filled = 0;
+  };
+  for (const auto& target : targets_) {
+    writer.fill(target, rows.middleRows(filled, rowCount(target)));
+    filled += rowCount(target);
+    if (filled + 3 > batch) flush();
   }
+  flush();
+  const Eigen::VectorXd factors = priorFactors(), values = priorValues(state);
+  sums.diagonal().head(parameters_) += factors.cwiseAbs2();
+  sums.row(parameters_).head(parameters_) += factors.cwiseProduct(values).transpose();
+  sums(parameters_, parameters_) += values.squaredNorm();
+  return sums.selfadjointView<Eigen::Lower>();
 }
 
 }  // namespace shaped

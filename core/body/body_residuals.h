@@ -1,40 +1,40 @@
 #pragma once
 
 #include <span>
-#include <vector>
 
 #include "core/body/body_fit.h"
 
 namespace shaped {
 
-/// The weighted distances that fitBody squares, and their derivatives. Rows: the targets, one each with a normal and
-/// three without; then the identity's coefficients and the joints' rotations, as the priors see them.
-///
-/// Parameters come in blocks: identity (k), placement (translation and the root's rotation, 6) and, where there are
-/// joints beside the root, their rotations (3 J - 3).
+/// The weighted distances whose squares fitBody sums, and their derivatives. Residuals: the targets, one each with a
+/// normal and three without; then the identity's coefficients and the joints' rotations as the priors see them.
+/// Parameters: identity (k), translation (3), then the rotations joint by joint, the root's first (3 J).
 class BodyResiduals {
  public:
+  using Rows = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>;
+
   /// model, targets: must outlive it. Weights and options must be valid.
   BodyResiduals(const BodyModel& model, std::span<const SurfaceTarget> targets, const BodyFitOptions& options);
 
-  Eigen::Index count() const { return target_rows_ + prior_rows_; }
-  std::vector<Eigen::Index> blockSizes() const;
-
-  /// values: count() numbers; jacobians: null, or one row-major count() x size array a block, any of them null. False
-  /// when the parameters give nothing finite.
-  bool evaluate(double const* const* parameters, double* values, double** jacobians) const;
+  Eigen::Index parameterCount() const { return parameters_; }
+  /// The sum of squares.
+  double energy(const BodyState& state) const;
+  /// [J r], one row a residual: derivatives, then the residual itself.
+  Rows rows(const BodyState& state) const;
+  /// [J r]^T [J r], symmetric: all that a least squares step needs, without a row ever being kept.
+  Eigen::MatrixXd squares(const BodyState& state) const;
 
  private:
-  using RowMajor = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>;
-  struct Jacobians;
+  class TargetRows;
 
-  BodyState stateOf(double const* const* parameters) const;
-  void addTargets(const PosedSkin& skin, double* values, Jacobians* jacobians) const;
-  void addPriors(const BodyState& state, double* values, Jacobians* jacobians) const;
+  Eigen::Index rowCount(const SurfaceTarget& target) const { return target.normal.isZero(0) ? 3 : 1; }
+  /// The priors are one residual a parameter, or none: factor and place.
+  Eigen::VectorXd priorFactors() const;
+  Eigen::VectorXd priorValues(const BodyState& state) const;
 
   const BodyModel& model_;
   std::span<const SurfaceTarget> targets_;
-  Eigen::Index joint_size_, target_rows_ = 0, prior_rows_;
+  Eigen::Index parameters_;
   double scale_, identity_prior_, joint_prior_;
 };
 

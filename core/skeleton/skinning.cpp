@@ -78,20 +78,20 @@ void PosedSkin::addLevers(Eigen::Index vertex, double share, Eigen::Matrix3Xd& l
 }
 
 void PosedSkin::poseRow(const Eigen::Matrix3Xd& levers, const Eigen::Vector3d& direction,
-                        Eigen::Ref<Eigen::VectorXd> row) const {
-  row.head<3>() = direction;
+                        Eigen::Ref<Eigen::RowVectorXd> row) const {
+  row.head<3>() = direction.transpose();
   for (std::int32_t joint = 0; joint < tree_.jointCount(); ++joint)
     row.segment<3>(3 + 3 * joint) =
-        turns_[std::size_t(joint)].transpose() * Eigen::Vector3d(levers.col(joint)).cross(direction);
+        Eigen::Vector3d(levers.col(joint)).cross(direction).transpose() * turns_[std::size_t(joint)];
 }
 
 void PosedSkin::poseDerivative(Eigen::Index vertex, Eigen::Ref<Eigen::Matrix3Xd> columns) const {
   Eigen::Matrix3Xd levers = Eigen::Matrix3Xd::Zero(3, tree_.jointCount());
   addLevers(vertex, 1, levers);
-  Eigen::VectorXd row(columns.cols());
+  Eigen::RowVectorXd row(columns.cols());
   for (int axis = 0; axis < 3; ++axis) {
     poseRow(levers, Eigen::Vector3d::Unit(axis), row);
-    columns.row(axis) = row.transpose();
+    columns.row(axis) = row;
   }
 }
 

@@ -35,7 +35,8 @@ class PosedSkin {
   /// rotations). Adds a vertex with its share to `levers` (3 x J, zero to begin with); from the sum, poseRow makes the
   /// row, 3 + 3 J numbers.
   void addLevers(Eigen::Index vertex, double share, Eigen::Matrix3Xd& levers) const;
-  void poseRow(const Eigen::Matrix3Xd& levers, const Eigen::Vector3d& direction, Eigen::Ref<Eigen::VectorXd> row) const;
+  void poseRow(const Eigen::Matrix3Xd& levers, const Eigen::Vector3d& direction,
+               Eigen::Ref<Eigen::RowVectorXd> row) const;
 
   /// How the joints' part of d x_i / d shape goes: for rest joints that change by `joint_modes` (3 J x k, joint by
   /// joint), what each bone's translation p_j - G_j r_j changes by, J matrices of 3 x k.

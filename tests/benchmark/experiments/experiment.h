@@ -37,6 +37,8 @@ void curves();
 void motions();
 /// Row "denoising".
 void denoising();
+/// Row "bodies".
+void bodyModels();
 /// Row "stop".
 void stopLatency();
 

@@ -33,41 +33,31 @@ TEST_CASE("derivatives of the body residuals meet central differences") {
   const BodyState state{randomIdentity(model, 2), randomPose(model.skeleton(), 0.9, 3)};
   const auto targets = mixedTargets(model, jitter(model.parts().mean, 0.1, 3));
   const BodyResiduals residuals(model, targets, {});
-  const auto sizes = residuals.blockSizes();
-  std::vector<std::vector<double>> blocks;
-  blocks.emplace_back(state.identity.begin(), state.identity.end());
-  blocks.emplace_back(6);
-  std::copy_n(state.pose.translation.data(), 3, blocks[1].data());
-  std::copy_n(state.pose.rotations.data(), 3, blocks[1].data() + 3);
-  blocks.emplace_back(state.pose.rotations.data() + 3, state.pose.rotations.data() + state.pose.rotations.size());
-  const auto values = [&] {
-    const double* parameters[] = {blocks[0].data(), blocks[1].data(), blocks[2].data()};
-    Eigen::VectorXd result(residuals.count());
-    REQUIRE(residuals.evaluate(parameters, result.data(), nullptr));
-    return result;
+  const auto rows = residuals.rows(state);
+  const Eigen::Index n = residuals.parameterCount();
+  Eigen::VectorXd at(n);
+  at << state.identity, toVector(state.pose);
+  const auto values = [&](Eigen::Index parameter, double step) -> Eigen::VectorXd {
+    const Eigen::VectorXd moved = at + step * Eigen::VectorXd::Unit(n, parameter);
+    return residuals.rows({moved.head(3), poseFrom(moved.tail(n - 3))}).col(n);
   };
-  using RowMajor = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>;
-  std::vector<RowMajor> jacobians;
-  for (const auto size : sizes) jacobians.push_back(RowMajor::Constant(residuals.count(), size, NAN));
-  {
-    const double* parameters[] = {blocks[0].data(), blocks[1].data(), blocks[2].data()};
-    double* wanted[] = {jacobians[0].data(), jacobians[1].data(), jacobians[2].data()};
-    Eigen::VectorXd ignored(residuals.count());
-    REQUIRE(residuals.evaluate(parameters, ignored.data(), wanted));
+  const double step = 1e-4, scale = rows.leftCols(n).cwiseAbs().maxCoeff();
+  for (Eigen::Index p = 0; p < n; ++p) {
+    const Eigen::VectorXd expected =
+        (8 * (values(p, step) - values(p, -step)) - (values(p, 2 * step) - values(p, -2 * step))) / (12 * step);
+    CHECK((rows.col(p) - expected).cwiseAbs().maxCoeff() < 1e-8 * scale);
+    CHECK(rows.col(p).norm() > 1e-3 * scale);
   }
-  for (std::size_t b = 0; b < 3; ++b)
-    for (std::size_t c = 0; c < blocks[b].size(); ++c) {
-      const double at = blocks[b][c], step = 1e-4;
-      Eigen::VectorXd samples[4];
-      for (int s = 0; s < 4; ++s) {
-        blocks[b][c] = at + step * std::array{-2, -1, 1, 2}[std::size_t(s)];
-        samples[s] = values();
-      }
-      blocks[b][c] = at;
-      const Eigen::VectorXd expected = (8 * (samples[2] - samples[1]) - (samples[3] - samples[0])) / (12 * step);
-      const double scale = jacobians[b].cwiseAbs().maxCoeff();
-      CHECK((jacobians[b].col(Eigen::Index(c)) - expected).cwiseAbs().maxCoeff() < 1e-8 * scale);
-    }
+}
+
+TEST_CASE("the squares of the body residuals are those of their rows") {
+  const auto model = tubeModel(4, 10, 3);
+  const BodyState state{randomIdentity(model, 2), randomPose(model.skeleton(), 0.9, 3)};
+  const auto targets = mixedTargets(model, jitter(model.parts().mean, 0.1, 3));
+  const BodyResiduals residuals(model, targets, {});
+  const Eigen::MatrixXd rows = residuals.rows(state), expected = rows.transpose() * rows;
+  CHECK((residuals.squares(state) - expected).cwiseAbs().maxCoeff() < 1e-12 * expected.cwiseAbs().maxCoeff());
+  CHECK(residuals.energy(state) == Approx(rows.col(rows.cols() - 1).squaredNorm()).epsilon(1e-13));
 }
 
 TEST_CASE("fitting a body recovers identity and pose from its own vertices") {
