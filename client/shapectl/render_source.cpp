@@ -6,7 +6,9 @@
 #include "client/shapectl/frame_range.h"
 #include "core/io/frames.h"
 #include "core/io/mesh_file.h"
+#include "core/io/scan_file.h"
 #include "core/numerics/error.h"
+#include "core/rendering/point_balls.h"
 #include "core/surface/closest_point.h"
 
 namespace shaped::shapectl {
@@ -29,6 +31,13 @@ void addFrames(std::vector<RenderItem>& items, const std::string& file, const Re
     items.push_back({frames.frame(frame), faces, stemOf(file) + " " + std::to_string(frame), {}});
 }
 
+RenderItem scanItem(const std::string& file) {
+  auto scan = readScan(file);
+  if (scan.faces.rows() > 0) return {std::move(scan.points), std::move(scan.faces), stemOf(file), {}};
+  auto balls = pointBalls(scan.points, touchingRadius(scan.points));
+  return {std::move(balls.vertices), std::move(balls.faces), stemOf(file), {}};
+}
+
 ItemErrors errorsOf(const RenderItem& item, const RenderItem& reference) {
   if (item.vertices.rows() == reference.vertices.rows() && item.faces == reference.faces)
     return {(item.vertices - reference.vertices).rowwise().norm()};
@@ -47,6 +56,7 @@ std::vector<RenderItem> RenderSource::items() const {
     auto mesh = readMesh(file);
     result.push_back({std::move(mesh.vertices), std::move(mesh.faces), stemOf(file), {}});
   }
+  for (const auto& file : scans) result.push_back(scanItem(file));
   return result;
 }
 

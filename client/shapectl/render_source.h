@@ -8,13 +8,15 @@
 
 namespace shaped::shapectl {
 
-/// What `render` draws: mesh files, and frames of .npy stacks whose connectivity a template gives.
+/// What `render` draws: mesh files, frames of .npy stacks whose connectivity a template gives, and scans.
 struct RenderSource {
   std::vector<std::string> files;
   std::string template_file;  ///< connectivity of the .npy files among them
   std::string frames;         ///< of each stack: "a:b:step"; empty: all, or 24 evenly spaced when there are more
 
-  /// Reads everything. Throws InvalidInput naming a file that cannot be read or lacks its template.
+  std::vector<std::string> scans;  ///< without faces they are drawn as little balls
+
+  /// Reads everything, files first. Throws InvalidInput naming a file that cannot be read or lacks its template.
   std::vector<RenderItem> items() const;
 };
 

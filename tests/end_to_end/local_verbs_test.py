@@ -1,5 +1,6 @@
-"""shapectl sample and render: verbs that need no daemon."""
+"""shapectl sample, sample-scan and render: verbs that need no daemon."""
 
+import json
 import pathlib
 import struct
 import subprocess
@@ -21,6 +22,25 @@ def png_size(path):
     head = path.read_bytes()[:24]
     assert head[:8] == b"\x89PNG\r\n\x1a\n", path
     return struct.unpack(">II", head[16:24])
+
+
+def ply_body(path):
+    head, body = path.read_bytes().split(b"end_header\n", 1)
+    counts = {words[1]: int(words[2]) for words in map(str.split, head.decode().splitlines()) if words[0] == "element"}
+    return counts, body
+
+
+def ply_scan(path):
+    counts, body = ply_body(path)
+    rows = numpy.frombuffer(body, "<f8").reshape(counts["vertex"], 6)
+    return rows[:, :3], rows[:, 3:]
+
+
+def ply_mesh(path):
+    counts, body = ply_body(path)
+    vertices = numpy.frombuffer(body, "<f8", 3 * counts["vertex"]).reshape(-1, 3)
+    corners = numpy.dtype([("count", "u1"), ("corners", "<i4", 3)])
+    return vertices, numpy.frombuffer(body, corners, counts["face"], vertices.nbytes)["corners"]
 
 
 class LocalVerbs(unittest.TestCase):
@@ -65,6 +85,65 @@ class LocalVerbs(unittest.TestCase):
         file = self.folder / "file"
         file.write_text("")
         self.refused("file/sub", "sample", file / "sub", code=INTERNAL)
+
+    def scan(self, name, *options):
+        result = shapectl("sample-scan", self.sample / "template.ply", "-o", self.folder / name, "--points", 2000, *options)
+        self.assertEqual(result.code, SUCCESS, result.out + result.err)
+        return result.json
+
+    def test_a_virtual_scan_is_written_with_its_truth(self):
+        truth_file = self.folder / "truth.json"
+        answer = self.scan("scan.ply", "--outliers", 0.1, "--truth", truth_file)
+        truth = json.loads(truth_file.read_text())
+        self.assertEqual(answer["points"], 2000)
+        self.assertEqual(len(answer["outliers"]), 200)
+        self.assertEqual({key: answer[key] for key in answer if key != "scan"},
+                         {key: truth[key] for key in truth if key not in ("faces", "barycentric", "cameras")})
+        self.assertGreater(answer["visible_fraction"], 0.7)
+        points, normals = ply_scan(self.folder / "scan.ply")
+        numpy.testing.assert_allclose(numpy.linalg.norm(normals, axis=1), 1)
+        # Moved back by the truth, all but the outliers lie where the truth says, up to noise.
+        moved = (points - truth["translation"]) @ numpy.array(truth["rotation"])
+        vertices, faces = ply_mesh(self.sample / "template.ply")
+        seen = numpy.setdiff1d(numpy.arange(2000), truth["outliers"])
+        corners = vertices[faces[numpy.array(truth["faces"])[seen]]]
+        places = numpy.einsum("nc,nci->ni", numpy.array(truth["barycentric"])[seen], corners)
+        distances = numpy.linalg.norm(moved[seen] - places, axis=1)
+        self.assertAlmostEqual(numpy.sqrt(numpy.mean(distances ** 2)), 0.0015, delta=0.0001)
+
+    def test_scans_lose_what_they_are_told_to_and_differ_by_seed(self):
+        whole = self.scan("whole.ply", "--outliers", 0, "--still")
+        self.assertEqual(whole["rotation"], [[1, 0, 0], [0, 1, 0], [0, 0, 1]])
+        gaps = self.scan("gaps.ply", "--outliers", 0, "--still", "--missing", 0.25, "--cut", 0.25, "--hole-radius", 30)
+        self.assertEqual(gaps["points"], 1000)
+        self.assertGreater(len(gaps["holes"]), 3)
+        self.assertIn("cut", gaps)
+        self.scan("again.ply", "--outliers", 0, "--still")
+        self.scan("other.ply", "--outliers", 0, "--still", "--seed", 2)
+        bytes_of = lambda name: (self.folder / name).read_bytes()
+        self.assertEqual(bytes_of("whole.ply"), bytes_of("again.ply"))
+        self.assertNotEqual(bytes_of("whole.ply"), bytes_of("other.ply"))
+
+    def test_sample_scan_refuses_bad_options(self):
+        out = self.folder / "refused.ply"
+        mesh = self.sample / "template.ply"
+        self.refused("points = 0", "sample-scan", mesh, "-o", out, "--points", 0)
+        self.refused("outliers = 1", "sample-scan", mesh, "-o", out, "--outliers", 1)
+        self.refused("holes + cut", "sample-scan", mesh, "-o", out, "--missing", 0.5, "--cut", 0.5)
+        self.refused("a scan is written as PLY", "sample-scan", mesh, "-o", self.folder / "refused.obj")
+        self.refused("missing.ply", "sample-scan", self.folder / "missing.ply", "-o", out)
+        self.assertFalse(out.exists())
+
+    def test_render_draws_scans_as_points(self):
+        self.scan("drawn.ply", "--still")
+        out = self.folder / "points.png"
+        result = shapectl("render", self.sample / "template.ply", "--scans", self.folder / "drawn.ply",
+                          self.sample / "template.ply", "-o", out, "--width", 64)
+        self.assertEqual(result.code, SUCCESS, result.err)
+        self.assertEqual([picture["caption"] for picture in result.json["pictures"]], ["template", "drawn", "template"])
+        self.refused("--error-against", "render", "--scans", self.folder / "drawn.ply", "-o", out, "--error-against",
+                     self.sample / "template.ply")
+        self.refused("nothing to draw", "render", "-o", out)
 
     def test_render_draws_meshes_and_stacks(self):
         out = self.folder / "sheet.png"

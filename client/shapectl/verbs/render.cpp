@@ -17,7 +17,7 @@ namespace {
 constexpr double kMillimetres = 1000;
 
 struct Render {
-  std::vector<std::string> files;
+  std::vector<std::string> files, scans;
   std::string out, template_file, frames, reference, up = "y";
   std::int64_t columns = 0, width = 320;
   double azimuth = 35, elevation = 18;
@@ -25,11 +25,13 @@ struct Render {
   bool own_scale = false, no_ground = false;
 
   void declare(Arguments& arguments) {
-    arguments.positionals("MESH", files, 1, "Meshes (OBJ, PLY, OFF, STL), or stacks .npy (n x V x 3) with --template");
+    arguments.positionals("MESH", files, 0, "Meshes (OBJ, PLY, OFF, STL), or stacks .npy (n x V x 3) with --template");
     arguments.option("-o,--out", out, "OUT.png", "The picture");
     arguments.required();
     arguments.option("--template", template_file, "T.ply", "Connectivity of .npy stacks");
     arguments.option("--frames", frames, "a:b:step", "Frames of each stack, as a Python slice (all, 24 at most)");
+    arguments.option("--scans", scans, "SCAN",
+                     "Scans (PLY, OBJ, OFF, STL, .npy, .xyz), drawn as points, after the meshes");
     arguments.option("--error-against", reference, "REF", "Colour by the distance to this mesh or stack");
     arguments.option("--error-limit", limit, "MM", "Distance of the darkest colour [mm] (from the data)");
     arguments.option("--columns", columns, "N", "Pictures in a row (chosen)");
@@ -43,9 +45,13 @@ struct Render {
 
   ExitCode run(const Session& session) const {
     auto options = sheetOptions();
-    auto items = RenderSource{files, template_file, frames}.items();
+    if (files.empty() && scans.empty())
+      throw InvalidInput("MESH", "nothing to draw; name meshes, or scans after --scans");
+    if (!reference.empty() && !scans.empty())
+      throw InvalidInput("--error-against", "colours meshes; draw the scans without it");
+    auto items = RenderSource{files, template_file, frames, scans}.items();
     std::vector<ItemErrors> errors;
-    if (!reference.empty()) errors = errorsAgainst(items, {{reference}, template_file, frames});
+    if (!reference.empty()) errors = errorsAgainst(items, {{reference}, template_file, frames, {}});
     if (!errors.empty()) colorByError(items, errors, options);
     const Image image = renderContactSheet(items, options, session.stop);
     if (session.stop.stop_requested()) return ExitCode::kCancelled;

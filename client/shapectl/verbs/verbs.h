@@ -34,6 +34,7 @@ Verb fitVerb();
 Verb scoreVerb();
 Verb evaluateVerb();
 Verb sampleVerb();
+Verb sampleScanVerb();
 Verb renderVerb();
 Verb tokenVerb();
 Verb topVerb();

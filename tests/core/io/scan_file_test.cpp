@@ -252,7 +252,7 @@ TEST_CASE("a scan that is none is not written") {
   refused(scan, "a.ply: face 0 has a vertex index outside [0, 3)");
 }
 
-TEST_CASE("the scans of the body data set are read whole [data]") {
+TEST_CASE("the scans of the body data set are read whole", "[data]") {
   const auto folder = test::realData("body_scans");
   if (!folder) return;
   const auto description = nlohmann::json::parse(std::ifstream(*folder / "scans.json"));

@@ -381,7 +381,7 @@ TEST_CASE("what the virtual scanner cannot do is refused by name") {
   CHECK_THROWS_WITH(scanVirtually(Vertices::Zero(42, 3), mesh.faces), Contains("faces: no face has area"));
 }
 
-TEST_CASE("virtual scans of real bodies are as those of the body data set [data]") {
+TEST_CASE("virtual scans of real bodies are as those of the body data set", "[data]") {
   const auto folder = test::realData("body_scans");
   if (!folder) return;
   const auto description = nlohmann::json::parse(std::ifstream(*folder / "scans.json"));
