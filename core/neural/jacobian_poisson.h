@@ -14,7 +14,7 @@ namespace shaped {
 using Jacobians = Eigen::Matrix<double, Eigen::Dynamic, 9, Eigen::RowMajor>;
 
 /// From a field of Jacobians over a source shape to the shape that has them as nearly as can be, and back: the
-/// differentiable layer of neural Jacobian fields [Aigerman et al. 2022, section 4; Muralikrishnan 2025, section 3.3.3
+/// differentiable layer of neural Jacobian fields [Aigerman et al. 2022; Muralikrishnan 2025, section 3.3.3
 /// and eq. 4.2].
 ///
 /// A shape x (V x 3) has on each triangle J_f = sum over its corners x_c (grad phi_c)^T, with the gradients of the

@@ -18,7 +18,7 @@
 namespace shaped {
 namespace {
 
-constexpr int kAlwaysDense = 64;
+constexpr int kAlwaysDense = 256;
 constexpr double kSearchTolerance = 1e-10;  ///< of the inverse's eigenvalues, relative
 constexpr double kSameEigenvalue = 1e-8;    ///< relative
 
@@ -57,12 +57,13 @@ struct EigenPairs {
   }
 };
 
-/// The functions constant on one component and zero elsewhere.
-EigenPairs constants(const Topology& topology, const SymmetricProblem& problem) {
-  Eigen::MatrixXd vectors = Eigen::MatrixXd::Zero(problem.areas.size(), topology.componentCount());
-  for (std::int32_t v = 0; v < topology.vertexCount(); ++v) vectors(v, topology.components()[v]) = problem.roots[v];
+/// The functions constant on one component and zero elsewhere, of the first `count` components.
+EigenPairs constants(const Topology& topology, const SymmetricProblem& problem, std::int32_t count) {
+  Eigen::MatrixXd vectors = Eigen::MatrixXd::Zero(problem.areas.size(), count);
+  for (std::int32_t v = 0; v < topology.vertexCount(); ++v)
+    if (topology.components()[v] < count) vectors(v, topology.components()[v]) = problem.roots[v];
   vectors.colwise().normalize();
-  return {Eigen::VectorXd::Zero(vectors.cols()), vectors};
+  return {Eigen::VectorXd::Zero(count), vectors};
 }
 
 /// Thrown through Spectra once the stop token has fired.
@@ -116,7 +117,9 @@ Eigen::VectorXd startVector(Eigen::Index size, unsigned seed) {
 /// One search beside what was found, to which it adds the `count` lowest pairs. False when it did not get as far.
 bool search(ShiftedInverse& inverse, double shift, Eigen::Index count, int max_restarts, EigenPairs& found,
             int& restarts) {
-  const auto subspace = std::min(inverse.rows(), 2 * count + 20);
+  const auto left = inverse.rows() - found.values.size();
+  count = std::min(count, left / 2);
+  const auto subspace = std::min(left, count + std::max<Eigen::Index>(64, count));
   Spectra::SymEigsSolver<ShiftedInverse> solver(inverse, count, subspace);
   const Eigen::VectorXd start =
       inverse.besideFound(startVector(inverse.rows(), static_cast<unsigned>(found.values.size())));
@@ -136,15 +139,18 @@ Outcome searchAll(const SymmetricProblem& problem, const SpectrumOptions& option
     outcome.termination = stop.stop_requested() ? Termination::kCancelled : Termination::kNumericalFailure;
     return outcome;
   }
-  const Eigen::Index again = std::max(4, options.count / 8);
+  Eigen::Index again = 1;
   outcome.termination = Termination::kIterationLimit;
-  for (int searches = 0; searches < options.max_searches; ++searches) {
+  for (int searches = 0; searches < options.max_searches && found.values.size() + 1 < inverse.rows(); ++searches) {
+    const auto before = found.values.size();
     const double last = found.smallest(options.count);
-    const auto missing = std::max<Eigen::Index>(options.count - found.values.size(), again);
+    const auto missing = std::max<Eigen::Index>(options.count - before, again);
     if (!search(inverse, problem.shift, missing, options.max_restarts, found, outcome.iterations)) break;
-    if (found.smallest(options.count) < (1 - kSameEigenvalue) * last) continue;
-    outcome.termination = Termination::kConverged;
-    break;
+    if (found.values.tail(found.values.size() - before).minCoeff() >= (1 - kSameEigenvalue) * last) {
+      outcome.termination = Termination::kConverged;
+      break;
+    }
+    if (searches > 0) again *= 4;  // a surface that repeats itself: more may be missing
   }
   return outcome;
 }
@@ -159,6 +165,20 @@ void solveDensely(const SymmetricProblem& problem, EigenPairs& found) {
   const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> eigen(matrix);
   const auto rest = matrix.rows() - found.values.size();
   found.append(eigen.eigenvalues().head(rest), eigen.eigenvectors().leftCols(rest));
+}
+
+/// Adds what is missing to the constants.
+Outcome complete(const SymmetricProblem& problem, const SpectrumOptions& options, const std::stop_token& stop,
+                 EigenPairs& found) {
+  try {
+    if (stop.stop_requested()) throw Stopped();
+    if (problem.areas.size() > std::max(kAlwaysDense, 4 * options.count))
+      return searchAll(problem, options, stop, found);
+    solveDensely(problem, found);
+    return {};
+  } catch (const Stopped&) {
+    return {Termination::kCancelled, 0, 0};
+  }
 }
 
 void chooseSign(Eigen::Ref<Eigen::VectorXd> function) {
@@ -202,17 +222,8 @@ Solved<SurfaceSpectrum> surfaceSpectrum(const Topology& topology, const Vertices
   requireValidShape(topology, shape, "shape");
   if (const auto violation = options.firstViolation(topology.vertexCount())) throw InvalidInput("options", *violation);
   const SymmetricProblem problem(topology, shape);
-  auto found = constants(topology, problem);
-  Outcome outcome;
-  try {
-    if (stop.stop_requested()) throw Stopped();
-    if (topology.vertexCount() <= std::max(kAlwaysDense, 4 * options.count))
-      solveDensely(problem, found);
-    else if (options.count > topology.componentCount())
-      outcome = searchAll(problem, options, stop, found);
-  } catch (const Stopped&) {
-    outcome.termination = Termination::kCancelled;
-  }
+  auto found = constants(topology, problem, std::min(topology.componentCount(), options.count));
+  auto outcome = options.count > topology.componentCount() ? complete(problem, options, stop, found) : Outcome();
   auto spectrum = lowest(problem, found, options.count);
   outcome.residual = residual(problem, spectrum);
   if (outcome.converged() && outcome.residual > options.tolerance) outcome.termination = Termination::kStalled;

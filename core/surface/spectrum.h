@@ -31,7 +31,7 @@ struct SpectrumOptions {
 /// Eigenpairs by the Lanczos method on M^1/2 (L + s M)^-1 M^1/2 with s = 1 / area, which is positive definite. The
 /// constants of each component are put in as they are known, and the method runs in what is left. It may meet only some
 /// of the functions that share an eigenvalue (on symmetric surfaces, or on several alike), so it searches again beside
-/// those found until nothing below the last eigenvalue turns up. Meshes of up to 64 or 4 k vertices are solved densely.
+/// those found until nothing below the last eigenvalue turns up. Meshes of up to 256 or 4 k vertices are solved densely.
 ///
 /// A function's sign is chosen so that the first vertex that has more than half its largest magnitude is positive; of
 /// functions that share an eigenvalue any orthonormal basis may come. The same input gives the same numbers.

@@ -7,8 +7,11 @@
 #include <limits>
 #include <thread>
 
+#include "core/io/frames.h"
+#include "core/io/mesh_file.h"
 #include "core/mesh/quality.h"
 #include "core/numerics/error.h"
+#include "tests/support/real_data.h"
 #include "tests/support/shapes.h"
 
 using namespace shaped;
@@ -229,6 +232,19 @@ TEST_CASE("a shape far from the origin keeps its Jacobians") {
   const auto poisson = poissonOn(mesh, mesh.vertices);
   const Vertices far = mesh.vertices.rowwise() + Eigen::RowVector3d(1e6, -1e6, 1e6);
   CHECK((poisson->jacobians(far) - poisson->jacobians(mesh.vertices)).cwiseAbs().maxCoeff() < 1e-8);
+}
+
+TEST_CASE("bodies come back from their Jacobians over the template") {
+  const auto file = realData("body_identities/template.ply"), frames = realData("body_identities/rest_f32.npy");
+  if (!file || !frames) return;
+  const auto body = readMesh(*file);
+  const auto topology = std::make_shared<Topology>(static_cast<std::int32_t>(body.vertices.rows()), body.faces);
+  const auto poisson = JacobianPoisson::make(topology, body.vertices);
+  const auto identities = readFrames(*frames);
+  for (const std::size_t i : {0, 40, 119}) {
+    const auto jacobians = poisson->jacobians(identities[i]);
+    CHECK((poisson->solve(jacobians, poisson->centroids(identities[i])) - identities[i]).cwiseAbs().maxCoeff() < 1e-11);
+  }
 }
 
 TEST_CASE("several threads may solve with one factor and agree with one thread") {

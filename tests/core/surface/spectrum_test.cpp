@@ -106,6 +106,15 @@ TEST_CASE("several components have as many zeros, and each its own spectrum") {
   }
 }
 
+TEST_CASE("on a surface of many equal functions none is left out") {
+  const auto mesh = icosphere(3), two = pairOf(mesh);
+  const auto four = pairOf(two);
+  const auto alone = spectrumOf(*mesh.topology, mesh.vertices, 25);
+  const auto all = spectrumOf(*four.topology, four.vertices, 100);
+  checkLaws(*four.topology, four.vertices, all);
+  for (int k = 0; k < 100; ++k) CHECK(all.eigenvalues[k] == Approx(alone.eigenvalues[k / 4]).epsilon(1e-9));
+}
+
 TEST_CASE("no more than the constants may be asked for") {
   const auto mesh = pairOf(icosphere(3));
   CHECK(spectrumOf(*mesh.topology, mesh.vertices, 1).eigenvalues == Eigen::VectorXd::Zero(1));
