@@ -5,6 +5,7 @@
 #include "core/io/file.h"
 #include "core/io/text_scanner.h"
 #include "core/numerics/error.h"
+#include "core/scene/gltf_check.h"
 
 namespace shaped {
 namespace {
@@ -14,10 +15,12 @@ const aiScene* read(Assimp::Importer& importer, const std::filesystem::path& pat
   const auto bytes = readFile(path);
   // Only checks: none of the steps that change data.
   constexpr unsigned steps = aiProcess_ValidateDataStructure;
-  if (bytes.starts_with("glTF")) return importer.ReadFileFromMemory(bytes.data(), bytes.size(), steps, "glb");
-  if (path.extension() != ".gltf")
+  const bool binary = bytes.starts_with("glTF");
+  if (!binary && path.extension() != ".gltf")
     throw InvalidInput(path.string(), "is no binary glTF; want a file that begins with 'glTF', or JSON named .gltf");
-  return importer.ReadFile(path.string(), steps);
+  requireSoundGltf(path.string(), bytes);
+  return binary ? importer.ReadFileFromMemory(bytes.data(), bytes.size(), steps, "glb")
+                : importer.ReadFile(path.string(), steps);
 }
 
 }  // namespace
