@@ -4,10 +4,9 @@
 #include <optional>
 #include <vector>
 
-#include "core/io/byte_reader.h"
-#include "core/io/json_fields.h"
 #include "core/io/text_scanner.h"
 #include "core/numerics/error.h"
+#include "core/scene/gltf_document.h"
 
 namespace shaped {
 namespace {
@@ -15,85 +14,6 @@ namespace {
 using nlohmann::json;
 
 constexpr std::int64_t kMost = std::int64_t{1} << 40;  ///< bytes: sums of two stay far from overflow
-
-/// The two parts of a file: its document, and how many bytes follow as the first buffer.
-struct Parts {
-  json document;
-  std::optional<std::int64_t> binary;
-};
-
-Parts parts(const std::string& file, std::string_view bytes) {
-  if (!bytes.starts_with("glTF")) return {parseJson(file, bytes), std::nullopt};
-  ByteReader reader(file, bytes);
-  reader.take(4);
-  if (const auto version = reader.number<std::uint32_t>(std::endian::little); version != 2)
-    throw InvalidInput(file, "is glTF of version " + std::to_string(version) + ", want 2");
-  if (reader.number<std::uint32_t>(std::endian::little) != bytes.size())
-    throw InvalidInput(file, "is truncated or has bytes left over: its header says another length");
-  const auto length = reader.number<std::uint32_t>(std::endian::little);
-  if (reader.take(4) != "JSON") throw InvalidInput(file, "does not begin with its JSON part");
-  Parts result{parseJson(file, reader.take(length)), std::nullopt};
-  if (reader.remaining() == 0) return result;
-  result.binary = reader.number<std::uint32_t>(std::endian::little);
-  if (reader.take(4) != std::string_view("BIN\0", 4)) throw InvalidInput(file, "has a second part that is not BIN");
-  reader.take(static_cast<std::size_t>(*result.binary));
-  return result;
-}
-
-/// One entry of the document, with its place for error texts.
-struct Entry {
-  const std::string& file;
-  const json& fields;
-  std::string place;
-
-  [[noreturn]] void fail(const std::string& problem) const { throw InvalidInput(file, place + " " + problem); }
-  bool has(const char* field) const { return fields.contains(field); }
-
-  std::int64_t whole(const char* field, std::int64_t least, std::int64_t most) const {
-    if (const auto value = wholeNumber(fields, field, least, most)) return *value;
-    fail(std::string("needs a whole number from ") + std::to_string(least) + " to " + std::to_string(most) + " as " +
-         field);
-  }
-
-  std::int64_t whole(const char* field, std::int64_t least, std::int64_t most, std::int64_t otherwise) const {
-    return has(field) ? whole(field, least, most) : otherwise;
-  }
-
-  Entry object(const char* field) const {
-    const auto found = fields.find(field);
-    if (found == fields.end() || !found->is_object()) fail(std::string("needs an object as ") + field);
-    return {file, *found, place + "." + field};
-  }
-
-  /// The list of that name, each of its entries an object; empty when there is none.
-  std::vector<Entry> list(const char* field) const {
-    std::vector<Entry> entries;
-    const auto found = fields.find(field);
-    if (found == fields.end()) return entries;
-    const std::string name = (place.empty() ? "" : place + ".") + field;
-    if (!found->is_array()) throw InvalidInput(file, name + " is no list");
-    for (const auto& value : *found) {
-      entries.push_back({file, value, name + "[" + std::to_string(entries.size()) + "]"});
-      if (!value.is_object()) entries.back().fail("is no object");
-    }
-    return entries;
-  }
-
-  /// The whole numbers in [0, count) of the list of that name; empty when there is none.
-  std::vector<std::int64_t> indices(const char* field, std::size_t count) const {
-    std::vector<std::int64_t> result;
-    const auto found = fields.find(field);
-    if (found == fields.end()) return result;
-    if (!found->is_array()) fail(std::string("needs a list as ") + field);
-    for (const auto& value : *found) {
-      if (!value.is_number_integer() || value < 0 || value >= count)
-        fail(std::string("names ") + field + " " + quotedWord(value.dump()) + ", outside [0, " + std::to_string(count) +
-             ")");
-      result.push_back(value.get<std::int64_t>());
-    }
-    return result;
-  }
-};
 
 /// What an accessor gives.
 struct Accessor {
@@ -103,9 +23,9 @@ struct Accessor {
 
 class Checker {
  public:
-  Checker(const std::string& file, const Parts& parts)
-      : root_{file, parts.document, ""},
-        binary_(parts.binary),
+  Checker(const std::string& file, const GltfDocument& document)
+      : root_{file, document.json, ""},
+        binary_(document.binary),
         nodes_(entries("nodes")),
         meshes_(entries("meshes")),
         skins_(entries("skins")) {}
@@ -122,7 +42,7 @@ class Checker {
   }
 
  private:
-  std::vector<Entry> entries(const char* field) const {
+  std::vector<GltfEntry> entries(const char* field) const {
     if (!root_.fields.is_object()) throw InvalidInput(root_.file, "is no JSON object");
     return root_.list(field);
   }
@@ -177,11 +97,11 @@ class Checker {
     }
   }
 
-  const Accessor& accessor(const Entry& entry, const char* field) const {
+  const Accessor& accessor(const GltfEntry& entry, const char* field) const {
     return accessors_[static_cast<std::size_t>(entry.whole(field, 0, last(accessors_)))];
   }
 
-  void checkMesh(const Entry& mesh) const {
+  void checkMesh(const GltfEntry& mesh) const {
     const auto primitives = mesh.list("primitives");
     if (primitives.empty()) mesh.fail("has no primitives");
     for (const auto& primitive : primitives) {
@@ -207,7 +127,7 @@ class Checker {
     }
   }
 
-  void checkSkin(const Entry& skin) const {
+  void checkSkin(const GltfEntry& skin) const {
     const auto joints = skin.indices("joints", nodes_.size());
     if (joints.empty()) skin.fail("has no joints");
     const auto& binds = accessor(skin, "inverseBindMatrices");  // which glTF lets be left out, and assimp does not
@@ -253,7 +173,7 @@ class Checker {
     if (met.size() != nodes_.size()) throw InvalidInput(root_.file, "has nodes that hang on each other in a ring");
   }
 
-  void checkAnimation(const Entry& animation) const {
+  void checkAnimation(const GltfEntry& animation) const {
     const auto samplers = animation.list("samplers");
     for (const auto& sampler : samplers) {
       const auto &times = accessor(sampler, "input"), &values = accessor(sampler, "output");
@@ -268,7 +188,7 @@ class Checker {
     }
   }
 
-  void checkValues(const Entry& sampler, const Entry& target) const {
+  void checkValues(const GltfEntry& sampler, const GltfEntry& target) const {
     const auto path = target.fields.find("path");
     const std::string kind = path != target.fields.end() && path->is_string() ? path->get<std::string>() : "";
     const auto& values = accessor(sampler, "output");
@@ -284,9 +204,9 @@ class Checker {
     return static_cast<std::int64_t>(list.size()) - 1;
   }
 
-  Entry root_;
+  GltfEntry root_;
   std::optional<std::int64_t> binary_;
-  std::vector<Entry> nodes_, meshes_, skins_;
+  std::vector<GltfEntry> nodes_, meshes_, skins_;
   std::vector<std::int64_t> sizes_, view_lengths_, strides_;
   std::vector<Accessor> accessors_;
 };
@@ -294,8 +214,8 @@ class Checker {
 }  // namespace
 
 void requireSoundGltf(const std::string& file, std::string_view bytes) {
-  const auto split = parts(file, bytes);
-  Checker(file, split).check();
+  const auto document = readGltfDocument(file, bytes);
+  Checker(file, document).check();
 }
 
 }  // namespace shaped
