@@ -64,11 +64,13 @@ struct Arm {
   }
 
   /// An animation with keys at 0 s and 1 s. values: of both keys.
-  void animate(const std::string& name, int node, const std::string& path, const std::vector<float>& values) {
+  void animate(const std::string& name, int node, const std::string& path, const std::vector<float>& values,
+               const std::string& interpolation = "LINEAR") {
     const int times = data.add(std::vector<float>{0, 1}, 1), keys = data.add(values, path == "rotation" ? 4 : 3);
-    document["animations"].push_back({{"name", name},
-                                      {"samplers", {{{"input", times}, {"output", keys}, {"interpolation", "LINEAR"}}}},
-                                      {"channels", {{{"sampler", 0}, {"target", {{"node", node}, {"path", path}}}}}}});
+    document["animations"].push_back(
+        {{"name", name},
+         {"samplers", {{{"input", times}, {"output", keys}, {"interpolation", interpolation}}}},
+         {"channels", {{{"sampler", 0}, {"target", {{"node", node}, {"path", path}}}}}}});
   }
 
   GltfRig read(const GltfOptions& options = {}) {
@@ -138,6 +140,22 @@ TEST_CASE("a glTF joint's turn about its own axes becomes one in frames that are
   const auto& rise = read.animations[1];
   CHECK(near(rise.clip.frames[4].translation.transpose(), {0, 0, 1}));  // twice 1 up, in halves of a metre
   CHECK(near(rise.clip.frames[4].rotations.row(1), {0, 0, 0}));
+}
+
+TEST_CASE("STEP and CUBICSPLINE go straight from key to key") {
+  Arm arm;
+  const std::vector<float> jump{0, 1, 0, 0, 2, 0};
+  arm.animate("linear", 1, "translation", jump);
+  arm.animate("step", 1, "translation", jump, "STEP");
+  // slope before, value, slope after: of each key
+  arm.animate("spline", 1, "translation", {7, 7, 7, 0, 1, 0, 7, 7, 7, 7, 7, 7, 0, 2, 0, 7, 7, 7}, "CUBICSPLINE");
+  const auto read = arm.read();
+  REQUIRE(read.animations.size() == 3);
+  for (const auto& animation : read.animations) {
+    INFO(animation.name);
+    CHECK(near(animation.clip.frames[15].translation.transpose(), {0, 0, 1}));
+    CHECK(near(animation.clip.frames[30].translation.transpose(), {0, 0, 2}));
+  }
 }
 
 TEST_CASE("a glTF animation that poses cannot say is refused with the joint and the frame, and the others are kept") {
