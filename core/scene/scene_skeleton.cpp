@@ -1,6 +1,7 @@
 #include "core/scene/scene_skeleton.h"
 
 #include <map>
+#include <ranges>
 #include <span>
 
 #include "core/io/text_scanner.h"
@@ -26,12 +27,12 @@ class JointFinder {
     for (Eigen::Index v = 0; v < mesh.weights.rows(); ++v)
       for (SkinWeights::InnerIterator entry(mesh.weights, v); entry; ++entry)
         carries[static_cast<std::size_t>(entry.col())] = true;
-    for (auto node = nodes.rbegin(); node != nodes.rend(); ++node) {
-      auto& burden = burdens_[*node];
+    for (const aiNode* node : std::views::reverse(nodes)) {
+      auto& burden = burdens_[node];
       burden.carries = burden.bone >= 0 && carries[static_cast<std::size_t>(burden.bone)];
       burden.leads_to_bones = burden.bone >= 0;
       burden.leads_to_vertices = burden.carries;
-      for (const aiNode* child : children(*node)) {
+      for (const aiNode* child : children(node)) {
         burden.leads_to_bones |= burdens_[child].leads_to_bones;
         burden.leads_to_vertices |= burdens_[child].leads_to_vertices;
       }
@@ -47,8 +48,8 @@ class JointFinder {
       const auto index = static_cast<std::int32_t>(found.size());
       found.push_back(next);
       const auto below = children(next.node);
-      for (auto child = below.rbegin(); child != below.rend(); ++child)
-        if (burdens_[*child].leads_to_bones) waiting.push_back(joint(*child, index));
+      for (const aiNode* child : std::views::reverse(below))
+        if (burdens_[child].leads_to_bones) waiting.push_back(joint(child, index));
     }
     return found;
   }
