@@ -12,6 +12,7 @@ find_package(CLI11 CONFIG REQUIRED)
 find_package(Spectra CONFIG REQUIRED)
 find_package(nanoflann CONFIG REQUIRED)
 find_package(embree 3 CONFIG REQUIRED)
+find_package(assimp CONFIG REQUIRED)
 find_package(PNG REQUIRED)
 find_package(GIF REQUIRED)
 find_package(OpenMP REQUIRED COMPONENTS CXX)  # only to limit the team inside CHOLMOD

@@ -4,6 +4,7 @@
 #include <cmath>
 #include <map>
 #include <numbers>
+#include <ranges>
 #include <set>
 
 #include "core/io/file.h"
@@ -279,7 +280,7 @@ std::vector<Placed> depthFirst(const Document& document) {
     const auto joint = static_cast<std::int32_t>(order.size());
     order.push_back(next);
     const auto& below = document.children[next.bone];
-    for (auto child = below.rbegin(); child != below.rend(); ++child) waiting.push_back({*child, joint});
+    for (const auto child : std::views::reverse(below)) waiting.push_back({child, joint});
   }
   return order;
 }

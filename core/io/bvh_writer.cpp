@@ -1,5 +1,6 @@
 #include <cmath>
 #include <numbers>
+#include <ranges>
 
 #include "core/io/bvh.h"
 #include "core/io/file.h"
@@ -45,7 +46,7 @@ std::vector<Nested> depthFirst(const Skeleton& skeleton) {
     waiting.pop_back();
     order.push_back(next);
     const auto& below = children[static_cast<std::size_t>(next.joint)];
-    for (auto child = below.rbegin(); child != below.rend(); ++child) waiting.push_back({*child, next.depth + 1});
+    for (const auto child : std::views::reverse(below)) waiting.push_back({child, next.depth + 1});
   }
   return order;
 }
