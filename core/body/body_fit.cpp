@@ -60,9 +60,9 @@ class Cost : public ceres::CostFunction {
       return true;
     }
     const Eigen::LDLT<Eigen::MatrixXd> factor(residuals_.squares(state));
-    const Eigen::MatrixXd upper = factor.matrixU();
-    const Eigen::MatrixXd root =
-        factor.vectorD().cwiseMax(0).cwiseSqrt().asDiagonal() * (upper * factor.transpositionsP());
+    // Of P^T L D L^T P: sqrt(D) L^T P. Pivoted, as the energy may leave a direction open.
+    Eigen::MatrixXd root = factor.transpositionsP() * Eigen::MatrixXd::Identity(n + 1, n + 1);
+    root = factor.vectorD().cwiseMax(0).cwiseSqrt().asDiagonal() * (factor.matrixU() * root);
     residual = root.col(n);
     Eigen::Index column = 0;
     for (std::size_t block = 0; block < parameter_block_sizes().size(); ++block) {
