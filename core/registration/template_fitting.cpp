@@ -1,0 +1,234 @@
+#include "core/registration/template_fitting.h"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+#include "core/mesh/quality.h"
+#include "core/numerics/error.h"
+#include "core/registration/fitting_report.h"
+#include "core/registration/fitting_step.h"
+
+namespace shaped {
+namespace {
+
+/// What one level does: its place between first and last, in numbers.
+struct LevelPlan {
+  double stiffness, landmark_weight;
+  CorrespondenceGates gates;
+  RobustLoss loss;
+};
+
+double between(double first, double last, double part) { return first * std::pow(last / first, part); }
+
+LevelPlan planLevel(const FittingOptions& options, int level) {
+  const double part = options.levels > 1 ? double(level) / (options.levels - 1) : 1;
+  LevelPlan plan;
+  plan.stiffness = between(options.first_stiffness, options.last_stiffness, part);
+  plan.landmark_weight = options.landmark_weight * std::sqrt(plan.stiffness / options.first_stiffness);
+  plan.gates = options.gates;
+  plan.gates.max_distance = between(options.first_max_distance, options.gates.max_distance, part);
+  plan.loss = options.loss;
+  return plan;
+}
+
+double medianDistance(const Correspondences& found) {
+  std::vector<double> accepted;
+  for (Eigen::Index v = 0; v < found.distances.size(); ++v)
+    if (found.accepted[v] > 0) accepted.push_back(found.distances[v]);
+  if (accepted.empty()) return 0;
+  std::nth_element(accepted.begin(), accepted.begin() + std::ptrdiff_t(accepted.size() / 2), accepted.end());
+  return accepted[accepted.size() / 2];
+}
+
+std::unique_ptr<Deformation> deformationOf(const FittingOptions& options, const Topology& topology,
+                                           const Vertices& placed) {
+  switch (options.method) {
+    case FittingMethod::kDisplacement:
+      return freeDisplacement(topology, placed);
+    case FittingMethod::kEdgeLengths:
+      return keptEdgeLengths(topology, placed);
+    case FittingMethod::kAffine:
+      break;
+  }
+  return affineDeformation(topology, placed, options.turn_length * boundingBoxDiagonal(placed));
+}
+
+/// One template on its way to one scan.
+class Fitting {
+ public:
+  Fitting(const ScanSurface& scan, const Topology& topology, const Vertices& placed,
+          const std::vector<Landmark>& landmarks, const FittingOptions& options, const std::stop_token& stop)
+      : scan_(scan),
+        topology_(topology),
+        landmarks_(landmarks),
+        options_(options),
+        stop_(stop),
+        deformation_(deformationOf(options, topology, placed)),
+        shares_(areaShares(topology.faces(), placed)),
+        diagonal_(boundingBoxDiagonal(placed)),
+        state_(deformation_->start()) {}
+
+  Vertices vertices() const { return deformation_->vertices(state_); }
+
+  double landmarkDistance() const {
+    double sum = 0, weight = 0;
+    for (const auto& landmark : landmarks_) {
+      if (!(landmark.weight > 0)) continue;
+      const Eigen::RowVector3d error =
+          deformation_->landmark(landmark.anchor).at(state_) - landmark.position.transpose();
+      sum += landmark.weight * error.squaredNorm();
+      weight += landmark.weight;
+    }
+    return weight > 0 ? std::sqrt(sum / weight) : 0;
+  }
+
+  FittingLevel run(LevelPlan plan) {
+    FittingLevel level{plan.stiffness, {}, 0, 0};
+    Correspondences found = correspondences(plan);
+    plan.loss.scale = std::max(plan.loss.scale, 2 * medianDistance(found));
+    double energy = energyOf(plan, found), lowest = energy;
+    level.energy_at_start = energy;
+    level.outcome.termination = Termination::kIterationLimit;
+    level.outcome.residual = std::numeric_limits<double>::infinity();
+    for (int idle = 0; level.outcome.iterations < options_.steps_per_level;) {
+      if (stop_.stop_requested()) return ended(level, Termination::kCancelled, energy);
+      if (found.acceptedCount() == 0) return ended(level, Termination::kNumericalFailure, energy);
+      const Vertices before = vertices();
+      if (!fittingStep(*deformation_, pulls(plan, found), plan.stiffness, state_, stop_))
+        return ended(level, stop_.stop_requested() ? Termination::kCancelled : Termination::kNumericalFailure, energy);
+      ++level.outcome.iterations;
+      level.outcome.residual = motion(before);
+      found = correspondences(plan);
+      energy = energyOf(plan, found);
+      if (level.outcome.residual <= options_.tolerance) return ended(level, Termination::kConverged, energy);
+      idle = energy < lowest ? 0 : idle + 1;
+      lowest = std::min(lowest, energy);
+      // New correspondences may raise the energy once (a gate opens); again and again means that they go in circles.
+      if (idle == 3) return ended(level, Termination::kStalled, energy);
+    }
+    return ended(level, Termination::kIterationLimit, energy);
+  }
+
+ private:
+  static FittingLevel ended(FittingLevel level, Termination termination, double energy) {
+    level.outcome.termination = termination;
+    level.energy_at_end = energy;
+    return level;
+  }
+
+  Correspondences correspondences(const LevelPlan& plan) const {
+    const Vertices shape = vertices();
+    return findCorrespondences(scan_, shape, vertexNormals(topology_.faces(), shape), plan.gates);
+  }
+
+  double squareOf(const Correspondences& found, Eigen::Index v) const {
+    return slidingSquare(state_.row(deformation_->positionRow(v)) - found.targets.row(v), found.normals.row(v),
+                         options_.sliding);
+  }
+
+  double energyOf(const LevelPlan& plan, const Correspondences& found) const {
+    const double left_out = plan.loss.value(plan.gates.max_distance * plan.gates.max_distance);
+    double sum = plan.stiffness * deformation_->energy(state_);
+    for (Eigen::Index v = 0; v < shares_.size(); ++v)
+      sum += shares_[v] * (found.accepted[v] > 0 ? plan.loss.value(squareOf(found, v)) : left_out);
+    for (const auto& landmark : landmarks_)
+      sum += plan.landmark_weight * landmark.weight *
+             (deformation_->landmark(landmark.anchor).at(state_) - landmark.position.transpose()).squaredNorm();
+    return sum;
+  }
+
+  /// r_i^2 bounded by |x - target|^2 with target = x - P (x - y), P = nn^T + (1 - sliding) (1 - nn^T), which has no
+  /// eigenvalue above 1.
+  Pulls pulls(const LevelPlan& plan, const Correspondences& found) const {
+    Pulls pulls{Vertices(shares_.size(), 3), Eigen::VectorXd(shares_.size()), {}};
+    for (Eigen::Index v = 0; v < shares_.size(); ++v) {
+      const Eigen::RowVector3d at = state_.row(deformation_->positionRow(v)), normal = found.normals.row(v);
+      const Eigen::RowVector3d off = at - found.targets.row(v);
+      const double sliding = normal.squaredNorm() > 0 ? options_.sliding : 0;
+      pulls.targets.row(v) = at - (1 - sliding) * off - sliding * off.dot(normal) * normal;
+      pulls.weights[v] = shares_[v] * found.accepted[v] * plan.loss.weight(squareOf(found, v));
+    }
+    for (const auto& landmark : landmarks_)
+      if (landmark.weight > 0)
+        pulls.landmarks.push_back({deformation_->landmark(landmark.anchor), landmark.position.transpose(),
+                                   plan.landmark_weight * landmark.weight});
+    return pulls;
+  }
+
+  /// Root mean square motion over the area, relative to the diagonal.
+  double motion(const Vertices& before) const {
+    const Eigen::VectorXd squares = (vertices() - before).rowwise().squaredNorm();
+    return std::sqrt(squares.dot(shares_)) / diagonal_;
+  }
+
+  const ScanSurface& scan_;
+  const Topology& topology_;
+  const std::vector<Landmark>& landmarks_;
+  const FittingOptions& options_;
+  const std::stop_token& stop_;
+  std::unique_ptr<Deformation> deformation_;
+  Eigen::VectorXd shares_;
+  double diagonal_;
+  Eigen::MatrixXd state_;
+};
+
+void requireLandmarks(const std::vector<Landmark>& landmarks, const Faces& faces) {
+  for (std::size_t l = 0; l < landmarks.size(); ++l) {
+    const std::string field = "landmarks[" + std::to_string(l) + "]";
+    const auto& landmark = landmarks[l];
+    if (landmark.anchor.face < 0 || landmark.anchor.face >= faces.rows())
+      throw InvalidInput(field, "lies on face " + std::to_string(landmark.anchor.face) + ", outside [0, " +
+                                    std::to_string(faces.rows()) + ")");
+    if (!landmark.position.allFinite()) throw InvalidInput(field, "has a position that is not finite");
+    if (!(landmark.weight >= 0) || !std::isfinite(landmark.weight))
+      throw InvalidInput(field, "has weight " + std::to_string(landmark.weight) + ", want a finite number >= 0");
+  }
+}
+
+std::string text(const char* field, double value, const char* wanted) {
+  return std::string(field) + " = " + std::to_string(value) + ", want " + wanted;
+}
+
+}  // namespace
+
+std::optional<std::string> FittingOptions::firstViolation() const {
+  if (!(first_stiffness > 0)) return text("first_stiffness", first_stiffness, "> 0");
+  if (!(last_stiffness > 0 && last_stiffness <= first_stiffness))
+    return text("last_stiffness", last_stiffness, "(0, first_stiffness]");
+  if (levels < 1) return "levels = " + std::to_string(levels) + ", want >= 1";
+  if (!(turn_length > 0)) return text("turn_length", turn_length, "> 0");
+  if (const auto violation = gates.firstViolation()) return "gates." + *violation;
+  if (!(first_max_distance >= gates.max_distance))
+    return text("first_max_distance", first_max_distance, ">= gates.max_distance");
+  if (!(loss.scale > 0)) return text("loss.scale", loss.scale, "> 0");
+  if (!(sliding >= 0 && sliding <= 1)) return text("sliding", sliding, "[0, 1]");
+  if (!(landmark_weight >= 0)) return text("landmark_weight", landmark_weight, ">= 0");
+  if (steps_per_level < 1) return "steps_per_level = " + std::to_string(steps_per_level) + ", want >= 1";
+  if (!(tolerance > 0)) return text("tolerance", tolerance, "> 0");
+  return std::nullopt;
+}
+
+Solved<FittedTemplate> fitTemplate(const ScanSurface& scan, const Topology& topology, const Vertices& placed,
+                                   const std::vector<Landmark>& landmarks, const FittingOptions& options,
+                                   const std::stop_token& stop) {
+  if (const auto violation = options.firstViolation()) throw InvalidInput("fitting options", *violation);
+  requireValidShape(topology, placed, "placed");
+  requireLandmarks(landmarks, topology.faces());
+  Fitting fitting(scan, topology, placed, landmarks, options, stop);
+  Solved<FittedTemplate> fitted;
+  for (int level = 0; level < options.levels; ++level) {
+    fitted.solution.levels.push_back(fitting.run(planLevel(options, level)));
+    const auto& outcome = fitted.solution.levels.back().outcome;
+    fitted.termination = outcome.termination;
+    fitted.iterations += outcome.iterations;
+    fitted.residual = outcome.residual;
+    if (outcome.termination == Termination::kCancelled || outcome.termination == Termination::kNumericalFailure) break;
+  }
+  fitted.solution.vertices = fitted.termination == Termination::kNumericalFailure ? placed : fitting.vertices();
+  fitted.solution.report = reportFit(scan, topology, placed, fitted.solution.vertices, options.gates);
+  fitted.solution.report.landmark_distance = fitting.landmarkDistance();
+  return fitted;
+}
+
+}  // namespace shaped
