@@ -195,10 +195,6 @@ Eigen::RowVector3d LinearPoint::at(const Eigen::MatrixXd& state) const {
   return point;
 }
 
-Eigen::MatrixXd Deformation::boundRight(const Eigen::MatrixXd& state) const {
-  return State(bound().selfadjointView<Eigen::Lower>() * state) - 0.5 * gradient(state);
-}
-
 Vertices Deformation::vertices(const Eigen::MatrixXd& state) const {
   Vertices vertices(vertex_count_, 3);
   for (Eigen::Index v = 0; v < vertex_count_; ++v) vertices.row(v) = state.row(positionRow(v));

@@ -24,8 +24,8 @@ struct LinearPoint {
 ///
 /// Unknowns: a state of U x 3 numbers, one column a coordinate. Its energy R has in every state z a quadratic upper
 /// bound R(y) <= sum over columns of y^T Q y - 2 y^T q(z) + constant that touches it in z, with Q the same for all
-/// states and columns: minimising the bound with data that are quadratic in y never raises R plus data, and one
-/// Cholesky factor serves the three coordinates. R is the bound itself where it is quadratic.
+/// states and columns: minimising the bound with data that are quadratic in y never raises R plus data (majorise and
+/// minimise), and one Cholesky factor serves the three coordinates. R is the bound itself where it is quadratic.
 class Deformation {
  public:
   virtual ~Deformation() = default;
@@ -42,8 +42,6 @@ class Deformation {
   virtual Eigen::Index positionRow(Eigen::Index vertex) const = 0;
   virtual LinearPoint landmark(const Anchor& anchor) const = 0;
 
-  /// q(z), U x 3: from R's gradient in z, which the bound shares.
-  Eigen::MatrixXd boundRight(const Eigen::MatrixXd& state) const;
   /// V x 3.
   Vertices vertices(const Eigen::MatrixXd& state) const;
 

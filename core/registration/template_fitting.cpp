@@ -12,6 +12,9 @@
 namespace shaped {
 namespace {
 
+/// Of a step's linear system; the next step has new correspondences anyway.
+constexpr double kAccuracy = 1e-2;
+
 /// What one level does: its place between first and last, in numbers.
 struct LevelPlan {
   double stiffness, landmark_weight;
@@ -85,6 +88,7 @@ class Fitting {
 
   FittingLevel run(LevelPlan plan) {
     FittingLevel level{plan.stiffness, {}, 0, 0};
+    FittingSteps steps(*deformation_, plan.stiffness);
     Correspondences found = correspondences(plan);
     plan.loss.scale = std::max(plan.loss.scale, 2 * medianDistance(found));
     double energy = energyOf(plan, found), lowest = energy;
@@ -95,7 +99,7 @@ class Fitting {
       if (stop_.stop_requested()) return ended(level, Termination::kCancelled, energy);
       if (found.acceptedCount() == 0) return ended(level, Termination::kNumericalFailure, energy);
       const Vertices before = vertices();
-      if (!fittingStep(*deformation_, pulls(plan, found), plan.stiffness, state_, stop_))
+      if (!steps.take(pulls(plan, found), kAccuracy, state_, stop_))
         return ended(level, stop_.stop_requested() ? Termination::kCancelled : Termination::kNumericalFailure, energy);
       ++level.outcome.iterations;
       level.outcome.residual = motion(before);
