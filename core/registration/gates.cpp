@@ -10,30 +10,12 @@ namespace {
 
 enum class Verdict { kAccepted, kTooFar, kWrongNormal, kAtBoundary };
 
-class Gatekeeper {
- public:
-  Gatekeeper(const CorrespondenceGates& gates, bool oriented)
-      : gates_(gates),
-        smallest_cosine_(std::cos(gates.max_normal_angle * std::numbers::pi / 180)),
-        oriented_(oriented) {}
-
-  Verdict judge(const ScanPoint& found, const Eigen::RowVector3d& normal) const {
-    if (found.distance > gates_.max_distance) return Verdict::kTooFar;
-    if (!normalsAgree(found.normal, normal)) return Verdict::kWrongNormal;
-    return gates_.reject_boundary && found.boundary ? Verdict::kAtBoundary : Verdict::kAccepted;
-  }
-
- private:
-  bool normalsAgree(const Eigen::RowVector3d& one, const Eigen::RowVector3d& other) const {
-    if (one.squaredNorm() == 0 || other.squaredNorm() == 0) return true;
-    const double cosine = one.dot(other);
-    return (oriented_ ? cosine : std::abs(cosine)) >= smallest_cosine_;
-  }
-
-  const CorrespondenceGates& gates_;
-  double smallest_cosine_;
-  bool oriented_;
-};
+Verdict judge(const CorrespondenceGates& gates, bool oriented, const ScanPoint& found,
+              const Eigen::RowVector3d& normal) {
+  if (found.distance > gates.max_distance) return Verdict::kTooFar;
+  if (!normalsAgree(gates, oriented, found.normal, normal)) return Verdict::kWrongNormal;
+  return gates.reject_boundary && found.boundary ? Verdict::kAtBoundary : Verdict::kAccepted;
+}
 
 }  // namespace
 
@@ -42,6 +24,13 @@ std::optional<std::string> CorrespondenceGates::firstViolation() const {
   if (!(max_normal_angle > 0 && max_normal_angle <= 180))
     return "max_normal_angle = " + std::to_string(max_normal_angle) + ", want (0, 180] degrees";
   return std::nullopt;
+}
+
+bool normalsAgree(const CorrespondenceGates& gates, bool oriented, const Eigen::RowVector3d& one,
+                  const Eigen::RowVector3d& other) {
+  if (one.squaredNorm() == 0 || other.squaredNorm() == 0) return true;
+  const double cosine = oriented ? one.dot(other) : std::abs(one.dot(other));
+  return cosine >= std::cos(gates.max_normal_angle * std::numbers::pi / 180);
 }
 
 double RobustLoss::value(double squared_residual) const {
@@ -76,12 +65,11 @@ Correspondences findCorrespondences(const ScanSurface& scan, const Vertices& ver
   if (normals.rows() != vertices.rows())
     throw InvalidInput("normals",
                        "has " + std::to_string(normals.rows()) + " rows, want " + std::to_string(vertices.rows()));
-  const Gatekeeper gatekeeper(gates, scan.hasOrientedNormals());
   const auto count = vertices.rows();
   Correspondences found{Vertices(count, 3), Vertices(count, 3), Eigen::VectorXd(count), Eigen::VectorXd(count)};
   for (Eigen::Index v = 0; v < count; ++v) {
     const ScanPoint point = scan.closest(vertices.row(v));
-    const Verdict verdict = gatekeeper.judge(point, normals.row(v));
+    const Verdict verdict = judge(gates, scan.hasOrientedNormals(), point, normals.row(v));
     found.targets.row(v) = point.position;
     found.normals.row(v) = point.normal;
     found.distances[v] = point.distance;

@@ -16,6 +16,10 @@ struct CorrespondenceGates {
   std::optional<std::string> firstViolation() const;  ///< "max_distance = 0, want > 0"
 };
 
+/// Whether two unit normals (zero: unknown, which agrees) pass the gate; unoriented ones as lines.
+bool normalsAgree(const CorrespondenceGates& gates, bool oriented, const Eigen::RowVector3d& one,
+                  const Eigen::RowVector3d& other);
+
 /// How much a large residual r counts: rho(r^2), which grows as r^2 near 0 and stays below scale^2. Its minimum is
 /// found by least squares with weights rho'(r^2), renewed after each solve (Holland and Welsch 1977).
 struct RobustLoss {

@@ -8,6 +8,7 @@
 #include "core/numerics/error.h"
 #include "core/registration/fitting_report.h"
 #include "core/registration/fitting_step.h"
+#include "core/registration/surface_samples.h"
 
 namespace shaped {
 namespace {
@@ -17,7 +18,7 @@ constexpr double kAccuracy = 1e-2;
 
 /// What one level does: its place between first and last, in numbers.
 struct LevelPlan {
-  double stiffness, landmark_weight;
+  double stiffness, landmark_weight, coverage_sliding;
   CorrespondenceGates gates;
   RobustLoss loss;
 };
@@ -29,19 +30,12 @@ LevelPlan planLevel(const FittingOptions& options, int level) {
   LevelPlan plan;
   plan.stiffness = between(options.first_stiffness, options.last_stiffness, part);
   plan.landmark_weight = options.landmark_weight * std::sqrt(plan.stiffness / options.first_stiffness);
+  plan.coverage_sliding = part * options.sliding;
   plan.gates = options.gates;
   plan.gates.max_distance = between(options.first_max_distance, options.gates.max_distance, part);
   plan.loss = options.loss;
+  plan.loss.scale = between(std::max(options.loss.scale, 0.5 * options.first_max_distance), options.loss.scale, part);
   return plan;
-}
-
-double medianDistance(const Correspondences& found) {
-  std::vector<double> accepted;
-  for (Eigen::Index v = 0; v < found.distances.size(); ++v)
-    if (found.accepted[v] > 0) accepted.push_back(found.distances[v]);
-  if (accepted.empty()) return 0;
-  std::nth_element(accepted.begin(), accepted.begin() + std::ptrdiff_t(accepted.size() / 2), accepted.end());
-  return accepted[accepted.size() / 2];
 }
 
 std::unique_ptr<Deformation> deformationOf(const FittingOptions& options, const Topology& topology,
@@ -57,6 +51,12 @@ std::unique_ptr<Deformation> deformationOf(const FittingOptions& options, const 
   return affineDeformation(topology, placed, options.turn_length * boundingBoxDiagonal(placed));
 }
 
+/// Both directions of correspondence.
+struct Matches {
+  Correspondences onto_scan;                 ///< of every template vertex
+  std::vector<std::int32_t> nearest_vertex;  ///< of every coverage point; -1 where the gates leave it out
+};
+
 /// One template on its way to one scan.
 class Fitting {
  public:
@@ -70,6 +70,8 @@ class Fitting {
         deformation_(deformationOf(options, topology, placed)),
         shares_(areaShares(topology.faces(), placed)),
         diagonal_(boundingBoxDiagonal(placed)),
+        seekers_(options.coverage > 0 ? everyFew(scan.points(), scan.normals(), options.coverage_points)
+                                      : SurfaceSamples{}),
         state_(deformation_->start()) {}
 
   Vertices vertices() const { return deformation_->vertices(state_); }
@@ -86,24 +88,23 @@ class Fitting {
     return weight > 0 ? std::sqrt(sum / weight) : 0;
   }
 
-  FittingLevel run(LevelPlan plan) {
+  FittingLevel run(const LevelPlan& plan) {
     FittingLevel level{plan.stiffness, {}, 0, 0};
     FittingSteps steps(*deformation_, plan.stiffness);
-    Correspondences found = correspondences(plan);
-    plan.loss.scale = std::max(plan.loss.scale, 2 * medianDistance(found));
+    Matches found = matches(plan);
     double energy = energyOf(plan, found), lowest = energy;
     level.energy_at_start = energy;
     level.outcome.termination = Termination::kIterationLimit;
     level.outcome.residual = std::numeric_limits<double>::infinity();
     for (int idle = 0; level.outcome.iterations < options_.steps_per_level;) {
       if (stop_.stop_requested()) return ended(level, Termination::kCancelled, energy);
-      if (found.acceptedCount() == 0) return ended(level, Termination::kNumericalFailure, energy);
+      if (found.onto_scan.acceptedCount() == 0) return ended(level, Termination::kNumericalFailure, energy);
       const Vertices before = vertices();
       if (!steps.take(pulls(plan, found), kAccuracy, state_, stop_))
         return ended(level, stop_.stop_requested() ? Termination::kCancelled : Termination::kNumericalFailure, energy);
       ++level.outcome.iterations;
       level.outcome.residual = motion(before);
-      found = correspondences(plan);
+      found = matches(plan);
       energy = energyOf(plan, found);
       if (level.outcome.residual <= options_.tolerance) return ended(level, Termination::kConverged, energy);
       idle = energy < lowest ? 0 : idle + 1;
@@ -121,19 +122,66 @@ class Fitting {
     return level;
   }
 
-  Correspondences correspondences(const LevelPlan& plan) const {
-    const Vertices shape = vertices();
-    return findCorrespondences(scan_, shape, vertexNormals(topology_.faces(), shape), plan.gates);
+  Matches matches(const LevelPlan& plan) const {
+    const Vertices shape = vertices(), normals = vertexNormals(topology_.faces(), shape);
+    return {findCorrespondences(scan_, shape, normals, plan.gates), nearestVertices(plan.gates, shape, normals)};
+  }
+
+  std::vector<std::int32_t> nearestVertices(const CorrespondenceGates& gates, const Vertices& shape,
+                                            const Vertices& normals) const {
+    std::vector<std::int32_t> nearest(static_cast<std::size_t>(seekers_.points.rows()), -1);
+    if (nearest.empty() || !shape.allFinite()) return nearest;
+    const PointTree tree(shape);
+    for (Eigen::Index s = 0; s < seekers_.points.rows(); ++s) {
+      const NearPoint near = tree.nearest(seekers_.points.row(s));
+      if (near.squared_distance <= gates.max_distance * gates.max_distance &&
+          normalsAgree(gates, scan_.hasOrientedNormals(), seekers_.normals.row(s), normals.row(near.index)))
+        nearest[static_cast<std::size_t>(s)] = near.index;
+    }
+    return nearest;
+  }
+
+  Eigen::RowVector3d at(Eigen::Index vertex) const { return state_.row(deformation_->positionRow(vertex)); }
+
+  double seekerSquare(const LevelPlan& plan, Eigen::Index s, std::int32_t vertex) const {
+    return slidingSquare(at(vertex) - seekers_.points.row(s), seekers_.normals.row(s), plan.coverage_sliding);
+  }
+
+  double seekerWeight() const { return options_.coverage / static_cast<double>(seekers_.points.rows()); }
+
+  double coverageEnergy(const LevelPlan& plan, const Matches& found, double left_out) const {
+    double sum = 0;
+    for (Eigen::Index s = 0; s < seekers_.points.rows(); ++s) {
+      const auto vertex = found.nearest_vertex[static_cast<std::size_t>(s)];
+      sum += seekerWeight() * (vertex < 0 ? left_out : plan.loss.value(seekerSquare(plan, s, vertex)));
+    }
+    return sum;
+  }
+
+  /// Adds what pulls vertices to the points that found them: pulls at one vertex add up to one pull.
+  void addCoverage(const LevelPlan& plan, const Matches& found, Pulls& pulls) const {
+    for (Eigen::Index s = 0; s < seekers_.points.rows(); ++s) {
+      const auto vertex = found.nearest_vertex[static_cast<std::size_t>(s)];
+      if (vertex < 0) continue;
+      const double weight = seekerWeight() * plan.loss.weight(seekerSquare(plan, s, vertex));
+      const double total = pulls.weights[vertex] + weight;
+      if (!(total > 0)) continue;
+      pulls.targets.row(vertex) +=
+          weight / total *
+          (slidTarget(vertex, seekers_.points.row(s), seekers_.normals.row(s), plan.coverage_sliding) -
+           pulls.targets.row(vertex));
+      pulls.weights[vertex] = total;
+    }
   }
 
   double squareOf(const Correspondences& found, Eigen::Index v) const {
-    return slidingSquare(state_.row(deformation_->positionRow(v)) - found.targets.row(v), found.normals.row(v),
-                         options_.sliding);
+    return slidingSquare(at(v) - found.targets.row(v), found.normals.row(v), options_.sliding);
   }
 
-  double energyOf(const LevelPlan& plan, const Correspondences& found) const {
+  double energyOf(const LevelPlan& plan, const Matches& matched) const {
+    const Correspondences& found = matched.onto_scan;
     const double left_out = plan.loss.value(plan.gates.max_distance * plan.gates.max_distance);
-    double sum = plan.stiffness * deformation_->energy(state_);
+    double sum = plan.stiffness * deformation_->energy(state_) + coverageEnergy(plan, matched, left_out);
     for (Eigen::Index v = 0; v < shares_.size(); ++v)
       sum += shares_[v] * (found.accepted[v] > 0 ? plan.loss.value(squareOf(found, v)) : left_out);
     for (const auto& landmark : landmarks_)
@@ -142,17 +190,23 @@ class Fitting {
     return sum;
   }
 
-  /// r_i^2 bounded by |x - target|^2 with target = x - P (x - y), P = nn^T + (1 - sliding) (1 - nn^T), which has no
-  /// eigenvalue above 1.
-  Pulls pulls(const LevelPlan& plan, const Correspondences& found) const {
+  /// r^2 of a vertex x to a point y is bounded by |x - target|^2 with target = x - P (x - y),
+  /// P = nn^T + (1 - sliding) (1 - nn^T), which has no eigenvalue above 1.
+  Eigen::RowVector3d slidTarget(Eigen::Index vertex, const Eigen::RowVector3d& point, const Eigen::RowVector3d& normal,
+                                double sliding) const {
+    const Eigen::RowVector3d off = at(vertex) - point;
+    if (normal.squaredNorm() == 0) return point;
+    return at(vertex) - (1 - sliding) * off - sliding * off.dot(normal) * normal;
+  }
+
+  Pulls pulls(const LevelPlan& plan, const Matches& matched) const {
+    const Correspondences& found = matched.onto_scan;
     Pulls pulls{Vertices(shares_.size(), 3), Eigen::VectorXd(shares_.size()), {}};
     for (Eigen::Index v = 0; v < shares_.size(); ++v) {
-      const Eigen::RowVector3d at = state_.row(deformation_->positionRow(v)), normal = found.normals.row(v);
-      const Eigen::RowVector3d off = at - found.targets.row(v);
-      const double sliding = normal.squaredNorm() > 0 ? options_.sliding : 0;
-      pulls.targets.row(v) = at - (1 - sliding) * off - sliding * off.dot(normal) * normal;
+      pulls.targets.row(v) = slidTarget(v, found.targets.row(v), found.normals.row(v), options_.sliding);
       pulls.weights[v] = shares_[v] * found.accepted[v] * plan.loss.weight(squareOf(found, v));
     }
+    addCoverage(plan, matched, pulls);
     for (const auto& landmark : landmarks_)
       if (landmark.weight > 0)
         pulls.landmarks.push_back({deformation_->landmark(landmark.anchor), landmark.position.transpose(),
@@ -174,6 +228,7 @@ class Fitting {
   std::unique_ptr<Deformation> deformation_;
   Eigen::VectorXd shares_;
   double diagonal_;
+  SurfaceSamples seekers_;  ///< points of the scan that look for the template
   Eigen::MatrixXd state_;
 };
 
@@ -207,6 +262,8 @@ std::optional<std::string> FittingOptions::firstViolation() const {
     return text("first_max_distance", first_max_distance, ">= gates.max_distance");
   if (!(loss.scale > 0)) return text("loss.scale", loss.scale, "> 0");
   if (!(sliding >= 0 && sliding <= 1)) return text("sliding", sliding, "[0, 1]");
+  if (!(coverage >= 0)) return text("coverage", coverage, ">= 0");
+  if (coverage_points < 1) return "coverage_points = " + std::to_string(coverage_points) + ", want >= 1";
   if (!(landmark_weight >= 0)) return text("landmark_weight", landmark_weight, ">= 0");
   if (steps_per_level < 1) return "steps_per_level = " + std::to_string(steps_per_level) + ", want >= 1";
   if (!(tolerance > 0)) return text("tolerance", tolerance, "> 0");

@@ -22,17 +22,21 @@ enum class FittingMethod {
 /// One scan after another of one kind, or one scan from stiff to soft: everything but scan and template.
 struct FittingOptions {
   FittingMethod method = FittingMethod::kAffine;
-  double first_stiffness = 1;       ///< alpha of the first level, > 0
+  double first_stiffness = 0.1;     ///< alpha of the first level, > 0
   double last_stiffness = 1e-5;     ///< of the last, (0, first_stiffness]
-  int levels = 9;                   ///< geometric from first to last, >= 1
+  int levels = 6;                   ///< geometric from first to last, >= 1
   double turn_length = 0.1;         ///< l of affineDeformation relative to the template's bounding box diagonal, > 0
   CorrespondenceGates gates;        ///< of the last level
   double first_max_distance = 0.3;  ///< m, of the first level (geometric in between), >= gates.max_distance
-  RobustLoss loss;                  ///< of the last level; earlier ones widen it to twice the median residual
-  double sliding = 0.9;             ///< 0: to the closest point; 1: to its tangent plane, free to slide in it; [0, 1]
-  double landmark_weight = 0.01;    ///< beta of the first level, falls with the square root of the stiffness, >= 0
-  int steps_per_level = 15;         ///< correspondences renewed at most so often, >= 1
-  double tolerance = 2e-4;          ///< root mean square motion of a step relative to the diagonal, > 0
+  RobustLoss loss;       ///< of the last level; its scale starts at first_max_distance / 2 (geometric in between)
+  double sliding = 0.9;  ///< 0: to the closest point; 1: to its tangent plane, free to slide in it; [0, 1].
+                         ///< The scan's points start at 0 and come to it in the last level
+  double coverage = 5;   ///< weight of the scan's points that look for the template, to the template's that look for
+                         ///< the scan, >= 0; 0: one-sided as in the papers
+  int coverage_points = 4000;     ///< of the scan, >= 1
+  double landmark_weight = 0.01;  ///< beta of the first level, falls with the square root of the stiffness, >= 0
+  int steps_per_level = 12;       ///< correspondences renewed at most so often, >= 1
+  double tolerance = 2e-4;        ///< root mean square motion of a step relative to the diagonal, > 0
   std::optional<std::string> firstViolation() const;  ///< "levels = 0, want >= 1"
 };
 
@@ -66,6 +70,8 @@ struct FittedTemplate {
 /// use: [Wuh18] chapter 9).
 ///   data = sum_i a_i rho(r_i^2) over the vertices that pass the gates,  a_i: share of the area,
 ///   r_i^2 = |n (x_i - y_i)|^2 + (1 - sliding) |the rest of x_i - y_i|^2,  y_i: closest scan point with normal n.
+/// Coverage adds the same the other way round, the mean of rho over points of the scan and their closest template
+/// vertices: without it a foot that starts above the scan's is content with the shin, and nothing asks for it below.
 /// For fixed correspondences each step minimises an upper bound that touches E, so E falls; the coordinates then share
 /// one matrix. A vertex left out by the gates adds rho(max_distance^2), so that leaving out is no gain.
 ///

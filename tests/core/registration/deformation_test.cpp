@@ -55,7 +55,7 @@ State affineState(const Deformation& deformation, const Mesh& mesh, const Eigen:
 Pulls somePulls(const Deformation& deformation, const Mesh& mesh) {
   Pulls pulls{jitter(mesh.vertices, 0.2, 3), Eigen::VectorXd::Constant(mesh.vertices.rows(), 0.01), {}};
   for (Eigen::Index v = 0; v < pulls.weights.size(); v += 3) pulls.weights[v] = 0;
-  pulls.landmarks.push_back({deformation.landmark({5, {0.2, 0.5, 0.3}, {}}), {1.5, 0, 0.2}, 0.7});
+  pulls.landmarks.push_back({deformation.landmark({5, {0.2, 0.5, 0.3}, {0, 0, 0}}), {1.5, 0, 0.2}, 0.7});
   return pulls;
 }
 

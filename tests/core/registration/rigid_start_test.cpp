@@ -100,7 +100,9 @@ TEST_CASE("landmarks place the template alone") {
     const Eigen::Vector3d at = position(anchor, mesh.topology->faces(), mesh.vertices);
     landmarks.push_back({anchor, truth.rotation * at + truth.translation, 1});
   }
-  landmarks.push_back({{7}, {100, 100, 100}, 0});  // does not count
+  landmarks.push_back(landmarks.front());
+  landmarks.back().position.setConstant(100);
+  landmarks.back().weight = 0;  // does not count
   const auto solved = startFromLandmarks(landmarks, mesh.vertices, mesh.topology->faces());
   CHECK(rotationError(solved.solution, truth) < 1e-6);
   CHECK(solved.solution.score < 1e-12);

@@ -35,7 +35,8 @@ Scan flatPoints(int count) {
 TEST_CASE("nearest points of a set are those of a search through all, in order") {
   const Vertices points = randomPoints(500, 1, 3), queries = randomPoints(50, 1.5, 4);
   const PointTree tree(points);
-  for (const Eigen::RowVector3d query : queries.rowwise()) {
+  for (Eigen::Index q = 0; q < queries.rows(); ++q) {
+    const Eigen::RowVector3d query = queries.row(q);
     Eigen::VectorXd squares = (points.rowwise() - query).rowwise().squaredNorm();
     std::vector<NearPoint> found(7);
     REQUIRE(tree.nearest(query, found) == 7);
@@ -64,7 +65,8 @@ TEST_CASE("a mesh scan knows closest point, normal and boundary") {
 TEST_CASE("a closed mesh has no boundary anywhere") {
   const ScanSurface scan(scanMesh(icosphere(3)));
   CHECK(scan.boundaryShare() == 0);
-  for (const Eigen::RowVector3d query : randomPoints(200, 2, 7).rowwise()) CHECK_FALSE(scan.closest(query).boundary);
+  const Vertices queries = randomPoints(200, 2, 7);
+  for (Eigen::Index q = 0; q < 200; ++q) CHECK_FALSE(scan.closest(queries.row(q)).boundary);
 }
 
 TEST_CASE("estimated normals of a sphere's points lie along the radius, and no sign is claimed") {

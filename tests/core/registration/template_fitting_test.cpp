@@ -1,5 +1,6 @@
 #include "core/registration/template_fitting.h"
 
+#include <Eigen/Geometry>
 #include <catch2/catch.hpp>
 
 #include "core/mesh/quality.h"
@@ -29,6 +30,7 @@ Mesh swollen(const Mesh& mesh) { return {mesh.topology, swell(mesh.vertices)}; }
 
 FittingOptions options() {
   FittingOptions options;
+  options.first_stiffness = 1;
   options.levels = 6;
   options.last_stiffness = 1e-4;
   options.gates.max_distance = 0.3;
@@ -44,6 +46,13 @@ Solved<FittedTemplate> fit(const Scan& scan, const Mesh& mesh, const FittingOpti
 
 double meanDistance(const Vertices& fitted, const Mesh& truth) {
   return distancesToSurface(fitted, truth.vertices, truth.topology->faces()).mean();
+}
+
+Landmark landmarkOn(std::int32_t face, const Eigen::Vector3d& position) {
+  Landmark landmark;
+  landmark.anchor.face = face;
+  landmark.position = position;
+  return landmark;
 }
 
 /// The part of a mesh whose triangles have no corner within `radius` of a point.
@@ -184,7 +193,7 @@ TEST_CASE("landmarks pull the template along where the shape leaves it open") {
   const Vertices truth = apply(turn, mesh.vertices);
   std::vector<Landmark> landmarks;
   for (std::int32_t face = 0; face < 1280; face += 100) {
-    const Anchor anchor{face, {0.2, 0.3, 0.5}, {}};
+    const Anchor anchor{face, {0.2, 0.3, 0.5}, {0, 0, 0}};
     landmarks.push_back({anchor, position(anchor, mesh.topology->faces(), truth), 1});
   }
   FittingOptions with = options();
@@ -252,14 +261,14 @@ TEST_CASE("fitting options and landmarks out of range are named") {
   };
   CHECK(with([](auto&) {}) == "fine");
   CHECK_THAT(with([](auto& o) { o.levels = 0; }), Contains("levels = 0, want >= 1"));
-  CHECK_THAT(with([](auto& o) { o.last_stiffness = 2; }), Contains("last_stiffness"));
+  CHECK_THAT(with([](auto& o) { o.last_stiffness = 20; }), Contains("last_stiffness"));
   CHECK_THAT(with([](auto& o) { o.gates.max_distance = 0; }), Contains("gates.max_distance"));
   CHECK_THAT(with([](auto& o) { o.first_max_distance = 0.1; }), Contains("first_max_distance"));
   CHECK_THAT(with([](auto& o) { o.sliding = 1.5; }), Contains("sliding"));
   CHECK_THAT(with([](auto& o) { o.tolerance = 0; }), Contains("tolerance"));
-  CHECK_THROWS_WITH(fit(scanMesh(mesh), mesh, options(), {{{1280}, {0, 0, 0}, 1}}),
+  CHECK_THROWS_WITH(fit(scanMesh(mesh), mesh, options(), {landmarkOn(1280, {0, 0, 0})}),
                     Contains("landmarks[0]") && Contains("face 1280"));
-  CHECK_THROWS_WITH(fit(scanMesh(mesh), mesh, options(), {{{0}, {0, 0, NAN}, 1}}), Contains("not finite"));
+  CHECK_THROWS_WITH(fit(scanMesh(mesh), mesh, options(), {landmarkOn(0, {0, 0, NAN})}), Contains("not finite"));
   Mesh wrong = mesh;
   wrong.vertices.conservativeResize(100, 3);
   CHECK_THROWS_WITH(fit(scanMesh(mesh), wrong), Contains("placed"));
