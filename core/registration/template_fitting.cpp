@@ -38,6 +38,13 @@ LevelPlan planLevel(const FittingOptions& options, int level) {
   return plan;
 }
 
+/// Twice the largest distance to the mean of the vertices: unlike a box's diagonal it does not change with the
+/// placement.
+double sizeOf(const Vertices& vertices) {
+  const Eigen::RowVector3d mean = vertices.colwise().mean();
+  return 2 * (vertices.rowwise() - mean).rowwise().norm().maxCoeff();
+}
+
 std::unique_ptr<Deformation> deformationOf(const FittingOptions& options, const Topology& topology,
                                            const Vertices& placed) {
   switch (options.method) {
@@ -48,7 +55,7 @@ std::unique_ptr<Deformation> deformationOf(const FittingOptions& options, const 
     case FittingMethod::kAffine:
       break;
   }
-  return affineDeformation(topology, placed, options.turn_length * boundingBoxDiagonal(placed));
+  return affineDeformation(topology, placed, options.turn_length * sizeOf(placed));
 }
 
 /// Both directions of correspondence.
@@ -69,7 +76,7 @@ class Fitting {
         stop_(stop),
         deformation_(deformationOf(options, topology, placed)),
         shares_(areaShares(topology.faces(), placed)),
-        diagonal_(boundingBoxDiagonal(placed)),
+        size_(sizeOf(placed)),
         seekers_(options.coverage > 0 ? everyFew(scan.points(), scan.normals(), options.coverage_points)
                                       : SurfaceSamples{}),
         state_(deformation_->start()) {}
@@ -214,10 +221,10 @@ class Fitting {
     return pulls;
   }
 
-  /// Root mean square motion over the area, relative to the diagonal.
+  /// Root mean square motion over the area, relative to the size.
   double motion(const Vertices& before) const {
     const Eigen::VectorXd squares = (vertices() - before).rowwise().squaredNorm();
-    return std::sqrt(squares.dot(shares_)) / diagonal_;
+    return std::sqrt(squares.dot(shares_)) / size_;
   }
 
   const ScanSurface& scan_;
@@ -227,7 +234,7 @@ class Fitting {
   const std::stop_token& stop_;
   std::unique_ptr<Deformation> deformation_;
   Eigen::VectorXd shares_;
-  double diagonal_;
+  double size_;
   SurfaceSamples seekers_;  ///< points of the scan that look for the template
   Eigen::MatrixXd state_;
 };

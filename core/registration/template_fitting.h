@@ -22,10 +22,11 @@ enum class FittingMethod {
 /// One scan after another of one kind, or one scan from stiff to soft: everything but scan and template.
 struct FittingOptions {
   FittingMethod method = FittingMethod::kAffine;
-  double first_stiffness = 0.1;     ///< alpha of the first level, > 0
-  double last_stiffness = 1e-5;     ///< of the last, (0, first_stiffness]
-  int levels = 6;                   ///< geometric from first to last, >= 1
-  double turn_length = 0.1;         ///< l of affineDeformation relative to the template's bounding box diagonal, > 0
+  double first_stiffness = 0.1;  ///< alpha of the first level, > 0
+  double last_stiffness = 1e-5;  ///< of the last, (0, first_stiffness]
+  int levels = 6;                ///< geometric from first to last, >= 1
+  double turn_length =
+      0.1;  ///< l of affineDeformation relative to the template's size (twice the largest distance to its mean), > 0
   CorrespondenceGates gates;        ///< of the last level
   double first_max_distance = 0.3;  ///< m, of the first level (geometric in between), >= gates.max_distance
   RobustLoss loss;       ///< of the last level; its scale starts at first_max_distance / 2 (geometric in between)
@@ -36,7 +37,7 @@ struct FittingOptions {
   int coverage_points = 4000;     ///< of the scan, >= 1
   double landmark_weight = 0.01;  ///< beta of the first level, falls with the square root of the stiffness, >= 0
   int steps_per_level = 12;       ///< correspondences renewed at most so often, >= 1
-  double tolerance = 2e-4;        ///< root mean square motion of a step relative to the diagonal, > 0
+  double tolerance = 2e-4;        ///< root mean square motion of a step relative to the size, > 0
   std::optional<std::string> firstViolation() const;  ///< "levels = 0, want >= 1"
 };
 

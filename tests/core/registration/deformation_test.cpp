@@ -145,7 +145,8 @@ TEST_CASE("the quadratic bound touches the energy and lies above it everywhere")
 
 TEST_CASE("after a step the gradient of the energy is zero where it is quadratic, and the energy falls where not") {
   const Mesh mesh = icosphere(2);
-  for (const auto& deformation : allDeformations(mesh)) {
+  const auto all = allDeformations(mesh);
+  for (const auto& deformation : all) {
     const Pulls pulls = somePulls(*deformation, mesh);
     const auto value = [&](const State& s) { return pulls.energy(*deformation, s) + 0.05 * deformation->energy(s); };
     State state = deformation->start();
@@ -154,9 +155,17 @@ TEST_CASE("after a step the gradient of the energy is zero where it is quadratic
     FittingSteps steps(*deformation, 0.05);
     REQUIRE(steps.take(pulls, 1e-10, state));
     CHECK(value(state) < 0.9 * before);
-    for (int step = 0; step < 400; ++step) steps.take(pulls, 1e-3, state);
+    double last = value(state);
+    for (int step = 0; step < 400; ++step) {
+      REQUIRE(steps.take(pulls, 1e-3, state));
+      REQUIRE(value(state) <= last * (1 + 1e-12));
+      last = value(state);
+    }
+    // edge lengths come near their minimum by and by
+    const bool quadratic = deformation != all.back();
+    const double reached = quadratic ? 1e-8 : 1e-3;
     const State settled = pulls.gradient(*deformation, state) + 0.05 * deformation->gradient(state);
-    CHECK(settled.cwiseAbs().maxCoeff() < 1e-8 * first.cwiseAbs().maxCoeff());
+    CHECK(settled.cwiseAbs().maxCoeff() < reached * first.cwiseAbs().maxCoeff());
   }
   const auto affine = affineDeformation(*mesh.topology, mesh.vertices, 0.3);
   State state = affine->start();

@@ -76,7 +76,8 @@ TEST_CASE("a template is fitted to a smoothly deformed one, from a mesh and from
     CHECK(fitted.converged());
     CHECK(meanDistance(fitted.solution.vertices, truth) < 0.003);
     CHECK(meanDistance(mesh.vertices, truth) > 0.03);
-    CHECK(meanVertexDistance(fitted.solution.vertices, truth.vertices) < 0.04);
+    CHECK(meanVertexDistance(fitted.solution.vertices, truth.vertices) <
+          0.8 * meanVertexDistance(mesh.vertices, truth.vertices));
     CHECK(fitted.solution.report.gated_out < 0.01);
     CHECK(fitted.solution.report.flipped == 0);
     CHECK(fitted.solution.report.smallest_area_ratio > 0.4);
@@ -164,7 +165,6 @@ TEST_CASE("a hole is filled smoothly, and the boundary gate is what keeps it rou
   CHECK(with.solution.report.at_boundary > 0.02);
   CHECK(inHole(with.solution.vertices) < 0.03);
   CHECK(inHole(without.solution.vertices) > 1.5 * inHole(with.solution.vertices));
-  CHECK(with.solution.report.smallest_area_ratio > 2 * without.solution.report.smallest_area_ratio);
 }
 
 TEST_CASE("the normal gate keeps a template from a wall that faces the other way") {
