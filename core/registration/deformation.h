@@ -40,6 +40,7 @@ class Deformation {
   virtual const Eigen::SparseMatrix<double>& bound() const = 0;
   /// Row of the state that holds a vertex's position.
   virtual Eigen::Index positionRow(Eigen::Index vertex) const = 0;
+  /// The plain deformations leave the offset of an anchor off the surface out: it is not linear in the vertices.
   virtual LinearPoint landmark(const Anchor& anchor) const = 0;
 
   /// V x 3.
