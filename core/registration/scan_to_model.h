@@ -25,12 +25,12 @@ struct ModelFitOptions {
                                        {1000, 0.20, 0.06, 0.020, true, 12},
                                        {3000, 0.10, 0.03, 0.008, true, 10},
                                        {20000, 0.05, 0.015, 0.005, true, 6}};
-  double max_normal_angle = 60;   ///< gate, degrees, (0, 180]
-  bool reject_boundary = true;    ///< gate
-  double pose_deviation = 0.5;    ///< BodyFitOptions
-  double observations = 1000;     ///< BodyFitOptions
-  double landmark_weight = 1;     ///< of all landmarks together, relative to one side of the scan, >= 0
-  double tolerance = 1e-4;        ///< of a round: root mean square motion of the model's vertices, m, > 0
+  double max_normal_angle = 60;  ///< gate, degrees, (0, 180]
+  bool reject_boundary = true;   ///< gate
+  double pose_deviation = 0.5;   ///< BodyFitOptions
+  double observations = 1000;    ///< BodyFitOptions
+  double landmark_weight = 1;    ///< of all landmarks together, relative to one side of the scan, >= 0
+  double tolerance = 1e-4;       ///< of a round: root mean square motion of the model's vertices, m, > 0
   std::stop_token stop = {};
 
   std::optional<std::string> firstViolation() const;  ///< "levels[0].points = 3, want >= 50"
@@ -46,10 +46,10 @@ struct RegionResidual {
 /// How a model lies on a scan.
 struct ModelFitReport {
   double scan_median = 0, scan_mean = 0, scan_95 = 0;  ///< of the scan's points to the model's surface, m
-  double model_mean = 0;    ///< of the model's vertices with a correspondence to the scan, m
-  double explained = 0;     ///< share of the scan's points that pass the gates
-  double seen = 0;          ///< share of the model's vertices that do
-  double chamfer = 0;       ///< (3.2) of [Mur25]: mean distance of both ways, m, gates left aside
+  double model_mean = 0;                               ///< of the model's vertices with a correspondence to the scan, m
+  double explained = 0;                                ///< share of the scan's points that pass the gates
+  double seen = 0;                                     ///< share of the model's vertices that do
+  double chamfer = 0;  ///< (3.2) of [Mur25]: mean distance of both ways, m, gates left aside
   std::vector<RegionResidual> regions;
 };
 

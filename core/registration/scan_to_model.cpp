@@ -1,0 +1,128 @@
+#include "core/registration/scan_to_model.h"
+
+#include <algorithm>
+#include <cmath>
+#include <numeric>
+
+#include "core/mesh/quality.h"
+#include "core/numerics/error.h"
+#include "core/registration/model_pairs.h"
+#include "core/skeleton/rotation.h"
+
+namespace shaped {
+namespace {
+
+std::vector<SurfaceTarget> landmarkTargets(const std::vector<Landmark>& landmarks, const Faces& faces, double weight) {
+  std::vector<SurfaceTarget> targets;
+  double sum = 0;
+  for (std::size_t i = 0; i < landmarks.size(); ++i) {
+    const auto& landmark = landmarks[i];
+    const std::string where = "landmarks[" + std::to_string(i) + "]";
+    if (landmark.anchor.face < 0 || landmark.anchor.face >= faces.rows())
+      throw InvalidInput(where, "is on face " + std::to_string(landmark.anchor.face) + ", and the model has " +
+                                    std::to_string(faces.rows()));
+    if (!landmark.position.allFinite() || !(landmark.weight >= 0)) throw InvalidInput(where, "is not finite");
+    SurfaceTarget target;
+    for (int c = 0; c < 3; ++c) target.corners[std::size_t(c)] = faces(landmark.anchor.face, c);
+    target.barycentric = landmark.anchor.barycentric;
+    target.position = landmark.position;
+    target.weight = landmark.weight;
+    sum += landmark.weight;
+    targets.push_back(target);
+  }
+  for (auto& target : targets) target.weight *= sum > 0 ? weight / sum : 0;
+  return targets;
+}
+
+BodyFitOptions fitOptions(const ModelFitOptions& options, const ModelFitLevel& level) {
+  BodyFitOptions fit;
+  fit.sigma = level.sigma;
+  fit.observations = options.observations;
+  fit.pose_deviation = options.pose_deviation;
+  // The pairs are renewed at once: a few steps on the old ones are enough.
+  fit.max_iterations = 4;
+  fit.tolerance = 1e-4;
+  fit.stop = options.stop;
+  return fit;
+}
+
+/// One level: pairs and steps in turn until the surface stands still.
+Outcome runLevel(const ModelPairs& pairs, const BodyModel& model, const std::vector<SurfaceTarget>& landmarks,
+                 const ModelFitOptions& options, const ModelFitLevel& level, BodyState& state) {
+  Outcome outcome{Termination::kIterationLimit, 0, 0};
+  Vertices surface = model.posed(state).vertices();
+  for (int round = 0; round < level.rounds; ++round) {
+    auto targets = pairs.find(surface, level);
+    if (targets.empty() && landmarks.empty()) return {Termination::kStalled, outcome.iterations, outcome.residual};
+    targets.insert(targets.end(), landmarks.begin(), landmarks.end());
+    const auto step = fitBody(model, state, targets, fitOptions(options, level));
+    outcome.iterations += step.iterations;
+    if (step.termination == Termination::kCancelled || step.termination == Termination::kNumericalFailure)
+      return {step.termination, outcome.iterations, outcome.residual};
+    state = step.solution;
+    const Vertices moved = model.posed(state).vertices();
+    outcome.residual = rmsVertexDistance(moved, surface);
+    surface = moved;
+    if (outcome.residual <= options.tolerance) {
+      outcome.termination = Termination::kConverged;
+      break;
+    }
+  }
+  return outcome;
+}
+
+}  // namespace
+
+std::optional<std::string> ModelFitOptions::firstViolation() const {
+  const auto positive = [](const std::string& field, double value) -> std::optional<std::string> {
+    if (value > 0 && std::isfinite(value)) return std::nullopt;
+    return field + " = " + std::to_string(value) + ", want > 0";
+  };
+  if (levels.empty()) return "levels is empty, want at least one";
+  for (std::size_t l = 0; l < levels.size(); ++l) {
+    const std::string at = "levels[" + std::to_string(l) + "].";
+    if (levels[l].points < 50) return at + "points = " + std::to_string(levels[l].points) + ", want >= 50";
+    if (levels[l].rounds < 1) return at + "rounds = " + std::to_string(levels[l].rounds) + ", want >= 1";
+    if (auto problem = positive(at + "max_distance", levels[l].max_distance)) return problem;
+    if (auto problem = positive(at + "loss_scale", levels[l].loss_scale)) return problem;
+    if (auto problem = positive(at + "sigma", levels[l].sigma)) return problem;
+  }
+  if (!(max_normal_angle > 0 && max_normal_angle <= 180))
+    return "max_normal_angle = " + std::to_string(max_normal_angle) + ", want (0, 180]";
+  if (!(landmark_weight >= 0) || !std::isfinite(landmark_weight))
+    return "landmark_weight = " + std::to_string(landmark_weight) + ", want >= 0";
+  if (auto problem = positive("pose_deviation", pose_deviation)) return problem;
+  if (auto problem = positive("observations", observations)) return problem;
+  return positive("tolerance", tolerance);
+}
+
+Solved<ModelFit> fitModelToScan(const ScanSurface& scan, const BodyModel& model, const BodyState& start,
+                                const std::vector<Landmark>& landmarks, const ModelFitOptions& options) {
+  if (const auto problem = options.firstViolation()) throw InvalidInput("options", *problem);
+  const auto pulls = landmarkTargets(landmarks, model.topology()->faces(), options.landmark_weight);
+  const ModelPairs pairs(scan, model, options);
+  Solved<ModelFit> result;
+  result.solution.state = start;
+  for (const auto& level : options.levels) {
+    const Outcome outcome = runLevel(pairs, model, pulls, options, level, result.solution.state);
+    result.termination = outcome.termination;
+    result.iterations += outcome.iterations;
+    result.residual = outcome.residual;
+    const bool over = outcome.termination == Termination::kCancelled ||
+                      outcome.termination == Termination::kNumericalFailure ||
+                      outcome.termination == Termination::kStalled;
+    if (over) break;
+  }
+  result.solution.report = pairs.report(model.posed(result.solution.state).vertices(), options.levels.back());
+  return result;
+}
+
+BodyState placedState(const BodyModel& model, const RigidMotion& motion) {
+  BodyState state = model.meanState();
+  state.pose.rotations.row(0) = axisAngle(motion.rotation).transpose();
+  const Eigen::Vector3d root = model.restJoints(state.identity).row(0).transpose();
+  state.pose.translation = motion.rotation * root + motion.translation - root;
+  return state;
+}
+
+}  // namespace shaped
