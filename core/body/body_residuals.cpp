@@ -102,6 +102,7 @@ Eigen::MatrixXd BodyResiduals::squares(const BodyState& state) const {
   TargetRows writer(*this, state);
   Eigen::Index filled = 0;
   const auto flush = [&] {
+    if (filled == 0) return;  // Eigen divides by it
     sums.selfadjointView<Eigen::Lower>().rankUpdate(rows.topRows(filled).transpose());
     filled = 0;
   };

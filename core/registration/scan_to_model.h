@@ -5,6 +5,7 @@
 #include <vector>
 
 #include "core/body/body_fit.h"
+#include "core/mesh/alignment.h"
 #include "core/registration/gates.h"
 #include "core/registration/landmark.h"
 

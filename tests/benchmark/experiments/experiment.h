@@ -39,6 +39,8 @@ void motions();
 void denoising();
 /// Row "bodies".
 void bodyModels();
+/// Row "registration".
+void registration();
 /// Row "stop".
 void stopLatency();
 

@@ -19,20 +19,23 @@ int main(int argc, char** argv) {
       {"0", row0Oracles},       {"2", row2Geodesics},     {"3", row3GeodesicTime},   {"4", row4PathSteps},
       {"5", row5Training},      {"6", row6Projection},    {"7", row7Generalisation}, {"8", row8RealTrial},
       {"9", row9VirtualTrials}, {"10", row10HandleEdits}, {"11", row11RigidMotions}, {"curves", curves},
-      {"motions", motions},     {"denoising", denoising}, {"bodies", bodyModels},    {"stop", stopLatency}};
+      {"motions", motions},     {"denoising", denoising}, {"bodies", bodyModels},    {"registration", registration},
+      {"stop", stopLatency}};
   shaped::server::useBestBlasKernels();
   shaped::limitLibraryThreads();
   if (argc < 2) {
-    std::fprintf(
-        stderr,
-        "usage: shaped_experiments ROW...   rows: 0 2 3 4 5 6 7 8 9 10 11 curves motions denoising bodies stop\n");
+    std::fprintf(stderr,
+                 "usage: shaped_experiments ROW...   rows: 0 2 3 4 5 6 7 8 9 10 11 curves motions denoising bodies "
+                 "registration stop\n");
     return 2;
   }
   for (int i = 1; i < argc; ++i) {
     const auto row = rows.find(argv[i]);
     if (row == rows.end()) {
-      std::fprintf(stderr, "there is no row '%s'; rows: 0 2 3 4 5 6 7 8 9 10 11 curves motions denoising bodies stop\n",
-                   argv[i]);
+      std::fprintf(
+          stderr,
+          "there is no row '%s'; rows: 0 2 3 4 5 6 7 8 9 10 11 curves motions denoising bodies registration stop\n",
+          argv[i]);
       return 2;
     }
     try {
