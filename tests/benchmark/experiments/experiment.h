@@ -41,6 +41,8 @@ void denoising();
 void bodyModels();
 /// Row "registration".
 void registration();
+/// Row "robustness".
+void robustness();
 /// Row "stop".
 void stopLatency();
 
