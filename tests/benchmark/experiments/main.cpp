@@ -22,13 +22,13 @@ int main(int argc, char** argv) {
       {"5", row5Training},        {"6", row6Projection},    {"7", row7Generalisation}, {"8", row8RealTrial},
       {"9", row9VirtualTrials},   {"10", row10HandleEdits}, {"11", row11RigidMotions}, {"curves", curves},
       {"motions", motions},       {"denoising", denoising}, {"bodies", bodyModels},    {"registration", registration},
-      {"robustness", robustness}, {"stop", stopLatency}};
+      {"robustness", robustness}, {"clothing", clothing},   {"stop", stopLatency}};
   shaped::server::useBestBlasKernels();
   shaped::limitLibraryThreads();
   if (argc < 2) {
     std::fprintf(stderr,
                  "usage: shaped_experiments ROW...   rows: 0 2 3 4 5 6 7 8 9 10 11 curves motions denoising bodies "
-                 "registration robustness stop\n");
+                 "registration robustness clothing stop\n");
     return 2;
   }
   for (int i = 1; i < argc; ++i) {
@@ -36,7 +36,7 @@ int main(int argc, char** argv) {
     if (row == rows.end()) {
       std::fprintf(stderr,
                    "there is no row '%s'; rows: 0 2 3 4 5 6 7 8 9 10 11 curves motions denoising bodies registration "
-                   "robustness stop\n",
+                   "robustness clothing stop\n",
                    argv[i]);
       return 2;
     }
