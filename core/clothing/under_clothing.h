@@ -19,19 +19,25 @@ struct ClothingWeights {
   double cloth;      ///< omega_cloth: of points outside it, beside what they have as data, >= 0
 };
 
+/// For people in motion, whose joints stand far from rest.
+ScanRegistrationOptions clothedRegistration();
+
 struct ClothingOptions {
-  int first_frames = 3;                    ///< that the first identity is solved on, >= 1
-  ClothingWeights first = {1, 1, 1};       ///< identity and posture of the first frames
-  ClothingWeights postures = {0.5, 1, 1};  ///< posture after posture, the identity held
-  ClothingWeights refined = {0, 1, 60};    ///< identity of all frames, the postures held
-  double loss_scale = 0.03;                ///< of the data term's robust loss, m, > 0
-  double max_distance = 0.15;              ///< gate, m, > 0
-  double max_normal_angle = 75;            ///< gate, degrees, (0, 180]
-  int points = 4000;                       ///< of the model that take part, >= 50
-  int rounds = 12;                         ///< closest points are renewed at most so often in a step, >= 1
-  int passes = 2;                          ///< postures and identity in turn, >= 1
-  double tolerance = 2e-4;                 ///< of a round: root mean square motion of the surface, m, > 0
-  ScanRegistrationOptions registration;    ///< of the first frame, whose start is unknown
+  int fitted_alone = 16;      ///< frames, spread over the sequence, that are registered by themselves, >= 1
+  double good_share = 0.975;  ///< of the best frame's score: what fits worse is tried again from other frames, 0 to 1
+  int retries = 3;            ///< poses of other frames that are tried, >= 0
+  int first_frames = 3;       ///< that the first identity is solved on, >= 1
+  ClothingWeights first = {1, 1, 1};        ///< identity and posture of the first frames
+  ClothingWeights postures = {0.5, 1, 20};  ///< posture after posture, the identity held
+  ClothingWeights refined = {0, 1, 1000};   ///< identity of all frames, the postures held
+  double loss_scale = 0.03;                 ///< of the data term's robust loss, m, > 0
+  double max_distance = 0.15;               ///< gate, m, > 0
+  double max_normal_angle = 75;             ///< gate, degrees, (0, 180]
+  int points = 4000;                        ///< of the model that take part, >= 50
+  int rounds = 12;                          ///< closest points are renewed at most so often in a step, >= 1
+  int passes = 2;                           ///< postures and identity in turn, >= 1
+  double tolerance = 2e-4;                  ///< of a round: root mean square motion of the surface, m, > 0
+  ScanRegistrationOptions registration = clothedRegistration();  ///< of first fits
   std::stop_token stop = {};
   ProgressSink progress = {};
 
@@ -44,6 +50,8 @@ struct ClothedFrame {
   Outcome outcome;  ///< of the posture
   double inside;    ///< share of the vertices with a scan point nearby that lie inside it
   double mean_gap;  ///< of those: how far they lie below the scan on the mean, m
+  double score;     ///< of its first fit (ScanRegistration::score)
+  bool trusted;     ///< whether it fitted well enough to speak of the identity; else its posture may be missed
 };
 
 struct ClothedBody {
@@ -55,12 +63,12 @@ struct ClothedBody {
 ///   E = sum over frames of omega_lnd E_lnd + omega_data E_data + omega_cloth E_cloth      (10.1) of [Wuh18]
 /// with E_data the robust squared distance of the body's points to the scan and E_cloth that of the points outside it:
 /// cloth lies now here, now there on the skin, and what is inside all frames is the body. Three steps: identity and
-/// postures of the first frames; the other postures, each from the one before; the identity of all frames with the
-/// postures held. The last two are repeated.
+/// postures of the first frames; the postures one by one, the identity held; the identity of all frames, the postures
+/// held. The last two are repeated. Ours: every frame's posture starts from a first fit of its scan by itself, or from
+/// the posture of a frame nearby that fitted better; "first" are the frames that fitted best.
 ///
-/// scans: at least one; landmarks: one list a frame, or none at all: the first frame is then placed by registerScan,
-/// and each other one starts from the one before. The outcome is the last identity's. Throws InvalidInput naming the
-/// option, `scans[i]` or `landmarks`.
+/// scans: at least one, in the order of the motion; each may lie anywhere. landmarks: one list a frame, or none at all.
+/// The outcome is the last identity's. Throws InvalidInput naming the option, `scans[i]` or `landmarks`.
 Solved<ClothedBody> estimateUnderClothing(std::span<const Scan> scans, const BodyModel& model,
                                           std::span<const std::vector<Landmark>> landmarks,
                                           const ClothingOptions& options = {});

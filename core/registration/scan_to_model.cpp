@@ -97,11 +97,16 @@ Solved<ModelFit> fitModelToScan(const ScanSurface& scan, const BodyModel& model,
 }
 
 BodyState placedState(const BodyModel& model, const RigidMotion& motion) {
-  BodyState state = model.meanState();
-  state.pose.rotations.row(0) = axisAngle(motion.rotation).transpose();
+  return carried(model, model.meanState(), motion);
+}
+
+BodyState carried(const BodyModel& model, const BodyState& state, const RigidMotion& motion) {
+  BodyState moved = state;
+  const Eigen::Matrix3d turn = rotationMatrix(state.pose.rotations.row(0).transpose());
+  moved.pose.rotations.row(0) = axisAngle(motion.rotation * turn).transpose();
   const Eigen::Vector3d root = model.restJoints(state.identity).row(0).transpose();
-  state.pose.translation = motion.rotation * root + motion.translation - root;
-  return state;
+  moved.pose.translation = motion.rotation * (root + state.pose.translation) + motion.translation - root;
+  return moved;
 }
 
 }  // namespace shaped

@@ -71,5 +71,7 @@ Solved<ModelFit> fitModelToScan(const ScanSurface& scan, const BodyModel& model,
 
 /// The mean body where a rigid motion carries it.
 BodyState placedState(const BodyModel& model, const RigidMotion& motion);
+/// A body moved rigidly as a whole.
+BodyState carried(const BodyModel& model, const BodyState& state, const RigidMotion& motion);
 
 }  // namespace shaped

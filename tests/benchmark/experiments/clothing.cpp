@@ -68,9 +68,9 @@ void clothing() {
     report.entry(text("frame %zu: v2v; cloth, median; %s", f, name(frame.outcome.termination).data()),
                  text("%.1f mm; %.1f mm", 1000 * error, 1000 * clothed.thickness[f]), "v2v < half the cloth",
                  error < 0.5 * clothed.thickness[f]);
-    report.entry(text("frame %zu: inside; mean gap", f),
-                 text("%.1f %%; %.1f mm", 100 * frame.inside, 1000 * frame.mean_gap), "98 % inside",
-                 frame.inside >= 0.98);
+    report.entry(
+        text("frame %zu (%s, score %.3f): inside; mean gap", f, frame.trusted ? "trusted" : "doubtful", frame.score),
+        text("%.1f %%; %.1f mm", 100 * frame.inside, 1000 * frame.mean_gap), "98 % inside", frame.inside >= 0.98);
   }
   const Vertices rest = model.rest(result.solution.identity);
   report.entry("identity at rest: v2v",
