@@ -1,0 +1,60 @@
+#pragma once
+
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "core/registration/rigid_start.h"
+#include "core/registration/scan_to_model.h"
+#include "core/registration/template_fitting.h"
+
+namespace shaped {
+
+/// After the model, the surface itself: stiff enough to stay where the model saw nothing.
+FittingOptions refinementDefaults();
+
+struct ScanRegistrationOptions {
+  RigidStartOptions start;
+  ModelFitOptions fit;
+  bool refine = false;  ///< whether the fitted surface is then deformed onto the scan (fitTemplate)
+  FittingOptions refinement = refinementDefaults();
+  double unit_factor = 1;         ///< the scan is multiplied by it first, > 0: 0.001 for millimetres
+  double doubtful_margin = 0.35;  ///< of the rigid start: below it the runner-up is tried as well, >= 0
+  double least_score = 0.85;      ///< below it the registration is called doubtful, 0 to 1
+  std::stop_token stop = {};
+
+  std::optional<std::string> firstViolation() const;  ///< "unit_factor = 0, want > 0"
+};
+
+/// A raw scan in the model's topology.
+struct ScanRegistration {
+  BodyState state;
+  Vertices vertices;      ///< V x 3, in the scan's place (times unit_factor): the model's surface, or the refined one
+  ModelFitReport report;  ///< of the model
+  std::optional<FittingReport> refinement;
+  double start_margin = 0;  ///< RigidStart::margin
+  bool took_runner_up = false;
+  bool flipped_normals = false;                 ///< the scan's normals pointed inwards and were turned over
+  std::optional<double> suspected_unit_factor;  ///< what unit_factor should perhaps have been
+  double score = 0;  ///< share of the scan within a hundredth of the model's extent of its surface, facing the same way
+  std::vector<std::string> warnings;  ///< sentences for people, the gravest first
+};
+
+/// Registers a raw scan, whatever its placement: rigid start (both ways where it is ambiguous), identity and pose
+/// (fitModelToScan), and the surface itself where asked for. With three landmarks or more the start comes from them.
+///
+/// residual and termination are of the model's fit, or of the refinement where that did not converge. Throws
+/// InvalidInput naming an option, `scan` (requireUsableScan) or a landmark.
+Solved<ScanRegistration> registerScan(const Scan& scan, const BodyModel& model, const std::vector<Landmark>& landmarks,
+                                      const ScanRegistrationOptions& options = {});
+
+/// From a state that is roughly right, as that of the last frame of a sequence: no rigid start.
+Solved<ScanRegistration> registerScanFrom(const Scan& scan, const BodyModel& model, const BodyState& start,
+                                          const std::vector<Landmark>& landmarks,
+                                          const ScanRegistrationOptions& options = {});
+
+/// Whether the normals of a scan point inwards on the whole: the mean of n . (x - centre), which for a closed surface
+/// is three times its volume, is negative. False without normals.
+bool pointsInwards(const Scan& scan);
+
+}  // namespace shaped
