@@ -28,7 +28,6 @@ FUZZ_WIRE_TARGET(wire_model, shaped::v1::Coefficients) {
   // Solving is not what is tested, and a far shape takes seconds: an abandoned request is checked and then ends.
   std::stop_source abandoned;
   abandoned.request_stop();
-  accepted<InvalidInput>([&] {
-    return ShellPgaShapes(smallModel()).synthesize(point, {.fine = false, .stop = abandoned.get_token()});
-  });
+  accepted<InvalidInput>(
+      [&] { return ShellPgaShapes(smallModel()).synthesize(point, {.fine = false, .stop = abandoned.get_token()}); });
 }

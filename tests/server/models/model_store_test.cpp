@@ -254,7 +254,7 @@ TEST_CASE("what another process puts into the store counts once it is loaded") {
   CHECK(store.pin({"m", 0, ""}) == before);
   CHECK(store.load("m", 0)->wait()->version == 2);
   CHECK(store.pin({"m", 0, ""})->version == 2);
-  CHECK(before->shapes->modes() == 2);            // who holds it keeps it
+  CHECK(before->shapes->modes() == 2);               // who holds it keeps it
   CHECK(store.loaded().size() == 1);                 // the store does not
   CHECK(pinNow(store, {"m", 1, ""})->version == 1);  // by number it can still be had
   CHECK(store.pin({"m", 0, ""})->version == 2);
