@@ -18,6 +18,7 @@ nlohmann::json idempotentCalls() {
   for (const auto* method : {"List", "Get", "WaitUntilReady"}) names.push_back(name("shaped.v1.Models", method));
   for (const auto* method : {"Project", "Synthesize", "Interpolate", "Edit", "Score", "Evaluate"})
     names.push_back(name("shaped.v1.Shapes", method));
+  names.push_back(name("shaped.v1.Registration", "Register"));
   for (const auto* method : {"Get", "List", "Wait"}) names.push_back(name("shaped.v1.Jobs", method));
   names.push_back(name("shaped.v1.Datasets", "List"));
   names.push_back(name("shaped.v1.Server", "GetLimits"));

@@ -7,6 +7,7 @@
 namespace shaped::shapectl {
 
 nlohmann::json toJson(const v1::Coefficients& coefficients) {
+  if (coefficients.body_size() > 0) return {{"body", coefficients.body()}};
   return {{"alpha", coefficients.alpha()}, {"scale", coefficients.scale()}};
 }
 
@@ -19,11 +20,17 @@ v1::Coefficients readCoefficients(const std::filesystem::path& path) {
   try {
     if (document.contains("coefficients")) document = document.at("coefficients");
     v1::Coefficients coefficients;
+    if (document.contains("body")) {
+      for (const auto& number : document.at("body")) coefficients.add_body(number.get<double>());
+      return coefficients;
+    }
     for (const auto& weight : document.at("alpha")) coefficients.add_alpha(weight.get<double>());
     coefficients.set_scale(document.value("scale", 1.0));
     return coefficients;
   } catch (const nlohmann::json::exception& error) {
-    throw InvalidInput(path.string(), std::string("want {\"alpha\": [numbers], \"scale\": number}: ") + error.what());
+    throw InvalidInput(
+        path.string(),
+        std::string("want {\"alpha\": [numbers], \"scale\": number} or {\"body\": [numbers]}: ") + error.what());
   }
 }
 

@@ -7,7 +7,7 @@
 
 namespace shaped::shapectl {
 
-/// {"alpha": [...], "scale": s}.
+/// {"alpha": [...], "scale": s}, or {"body": [...]} of a body.
 nlohmann::json toJson(const v1::Coefficients& coefficients);
 void writeCoefficients(const std::filesystem::path& path, const v1::Coefficients& coefficients);
 /// Reads that form, or a document that holds it as "coefficients" (what `shapectl project --output json` prints).

@@ -31,6 +31,49 @@ std::string stateText(const v1::ModelDescription& description) {
   return text;
 }
 
+std::string nameOf(v1::PostureNormalisation posture) {
+  switch (posture) {
+    case v1::POSTURE_NORMALISATION_NONE:
+      return "none";
+    case v1::POSTURE_NORMALISATION_SKELETON:
+      return "skeleton";
+    case v1::POSTURE_NORMALISATION_LOCAL:
+      return "local";
+    default:
+      return "unknown";
+  }
+}
+
+ModelSize sizeOf(const v1::ModelDescription& description) {
+  if (description.has_body()) return {description.body().training_shapes(), description.body().modes()};
+  return {description.shell_pga().training_shapes(), description.shell_pga().modes()};
+}
+
+namespace {
+
+nlohmann::json toJson(const v1::ModelDescription::ShellPga& pga) {
+  return {{"training_shapes", pga.training_shapes()},
+          {"modes", pga.modes()},
+          {"path_steps", pga.path_steps()},
+          {"coarse_vertices", pga.coarse_vertices()},
+          {"bending", pga.bending()},
+          {"path_energy", pathEnergyText(pga.path_energy())},
+          {"eigenvalues", pga.eigenvalues()}};
+}
+
+nlohmann::json toJson(const v1::ModelDescription::Body& body) {
+  auto joints = nlohmann::json::array();
+  for (const auto& joint : body.joints()) joints.push_back({{"name", joint.name()}, {"parent", joint.parent()}});
+  return {{"training_shapes", body.training_shapes()},
+          {"modes", body.modes()},
+          {"joints", joints},
+          {"limits", body.limits()},
+          {"posture", nameOf(body.posture())},
+          {"variances", body.variances()}};
+}
+
+}  // namespace
+
 nlohmann::json toJson(const v1::ModelDescription& description) {
   nlohmann::json document{{"kind", description.kind()},
                           {"topology_id", description.topology_id()},
@@ -44,14 +87,8 @@ nlohmann::json toJson(const v1::ModelDescription& description) {
   document["serving"] = description.serving();
   addModel(document, description.model());
   addReport(document["training"], description.training());
-  const auto& pga = description.shell_pga();
-  document["shell_pga"] = {{"training_shapes", pga.training_shapes()},
-                           {"modes", pga.modes()},
-                           {"path_steps", pga.path_steps()},
-                           {"coarse_vertices", pga.coarse_vertices()},
-                           {"bending", pga.bending()},
-                           {"path_energy", pathEnergyText(pga.path_energy())},
-                           {"eigenvalues", pga.eigenvalues()}};
+  if (description.has_shell_pga()) document["shell_pga"] = toJson(description.shell_pga());
+  if (description.has_body()) document["body"] = toJson(description.body());
   return document;
 }
 

@@ -18,4 +18,13 @@ std::string stateText(const v1::ModelDescription& description);
 
 nlohmann::json toJson(const v1::ModelDescription& description);
 
+/// "none", "skeleton", "local".
+std::string nameOf(v1::PostureNormalisation posture);
+
+/// What models of every kind have.
+struct ModelSize {
+  std::uint32_t training_shapes, modes;
+};
+ModelSize sizeOf(const v1::ModelDescription& description);
+
 }  // namespace shaped::shapectl

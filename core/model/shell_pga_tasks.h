@@ -1,17 +1,15 @@
 #pragma once
 
 #include "core/editing/anchored_fit.h"
+#include "core/model/shape_model.h"
 #include "core/model/shell_pga_model.h"
 
 namespace shaped {
 
 /// How probable a shape is under the model: a Gaussian in the tangent coordinates with the eigenvalues as variances.
-/// Modes with less than 1e-6 of the largest variance, or with a negative one, do not count.
-struct ShellPgaScore {
-  double mahalanobis = 0;        ///< distance of the projection to the mean in units of the model's deviations
-  double log_likelihood = 0;     ///< of the projection's J tangent coordinates [m], natural logarithm of the density
-  double residual_distance = 0;  ///< sqrt(W[s, P[s]]), the part that the model does not explain [m]
-};
+/// Modes with less than 1e-6 of the largest variance, or with a negative one, do not count. The residual distance is
+/// sqrt(W[s, P[s]]).
+using ShellPgaScore = ShapeScore;
 
 struct ShellPgaProjection {
   Vertices shape;  ///< P[s] at full resolution, rigidly aligned to the input
@@ -22,26 +20,9 @@ struct ShellPgaProjection {
   double smallest_area_ratio = 1;  ///< over triangles: area in `shape` over area in the mean
 };
 
-struct ProjectionOptions {
-  int modes = 0;      ///< J to use, 0 = all of the model's
-  bool fine = false;  ///< finish P[s] by Newton's method at full resolution instead of prolongating it
-  std::stop_token stop;
-};
-
 /// Projection (17)-(20) of [HZRS18] of a full-resolution shape, with its Mahalanobis distance and likelihood. Throws
 /// InvalidInput naming "shape" when it does not fit the model's topology, or "modes".
 Solved<ShellPgaProjection> project(const ShellPgaModel& model, const Vertices& shape, const ProjectionOptions& options);
-
-/// A full-resolution shape with a solver's quality.
-struct SynthesizedShape {
-  Vertices shape;
-  double smallest_area_ratio = 1;
-};
-
-struct SynthesisOptions {
-  bool fine = false;  ///< finish by Newton's method at full resolution instead of prolongating the coarse shape
-  std::stop_token stop;
-};
 
 /// The full-resolution shape of coefficients. Throws InvalidInput naming "alpha", "alpha[j]" or "scale" when they are
 /// no point of the submanifold.

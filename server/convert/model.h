@@ -1,6 +1,7 @@
 #pragma once
 
-#include "core/model/shell_pga_tasks.h"
+#include "core/body/posture.h"
+#include "core/model/shape_model.h"
 #include "server/convert/limits.h"
 #include "server/models/model_store.h"
 #include "shaped/v1/model.pb.h"
@@ -15,11 +16,14 @@ void toProto(const ServedModel& model, v1::ModelDescription& description);
 
 ModelSelector selectorFromProto(const v1::ModelSelector& message);
 
-/// The weights as they came; whether they are a point of a model is for the model to say. Throws InvalidInput when they
-/// are more than the limits allow.
-SubmanifoldPoint coefficientsFromProto(const v1::Coefficients& coefficients, const Limits& limits);
-void toProto(const SubmanifoldPoint& point, v1::Coefficients& coefficients);
-void toProto(const ShellPgaScore& score, v1::Score& message);
+/// The numbers as they came; whether they are a point of a model is for the model to say. Throws InvalidInput when they
+/// are more than the limits allow, or those of two kinds at once.
+ModelPoint coefficientsFromProto(const v1::Coefficients& coefficients, const Limits& limits);
+void toProto(const ModelPoint& point, v1::Coefficients& coefficients);
+void toProto(const ShapeScore& score, v1::Score& message);
+
+/// Throws InvalidInput naming `field`.
+PostureNormalisation postureFromProto(v1::PostureNormalisation posture, const std::string& field);
 
 /// Throws InvalidInput naming `field` when the number is above `most`.
 int countFromProto(std::uint32_t value, int most, const std::string& field);

@@ -74,11 +74,13 @@ Daemon::Daemon(const DaemonOptions& options)
       jobs_service_(runtime_, job_context_, job_registry_, jobs_),
       shapes_service_(runtime_, options_.limits, models_, datasets_),
       curves_service_(runtime_, options_.limits, models_, datasets_),
+      registration_service_(runtime_, options_.limits, models_),
       server_service_(runtime_, options_.limits, "shaped " SHAPED_VERSION),
       admin_service_(runtime_) {
   for (const char* service :
        {v1::Models::service_full_name(), v1::Datasets::service_full_name(), v1::Jobs::service_full_name(),
-        v1::Shapes::service_full_name(), v1::Curves::service_full_name(), v1::Server::service_full_name(), v1::Admin::service_full_name()})
+        v1::Shapes::service_full_name(), v1::Curves::service_full_name(), v1::Registration::service_full_name(),
+        v1::Server::service_full_name(), v1::Admin::service_full_name()})
     declareMethods(service, metrics_);
   for (const auto& [kind, how] : jobKinds(job_context_))
     for (const auto state : {JobState::kSucceeded, JobState::kFailed, JobState::kCancelled})
@@ -125,7 +127,7 @@ void Daemon::listen(const std::string& address) {
   for (grpc::Service* service :
        {static_cast<grpc::Service*>(&models_service_), static_cast<grpc::Service*>(&datasets_service_),
         static_cast<grpc::Service*>(&jobs_service_), static_cast<grpc::Service*>(&shapes_service_),
-        static_cast<grpc::Service*>(&curves_service_),
+        static_cast<grpc::Service*>(&curves_service_), static_cast<grpc::Service*>(&registration_service_),
         static_cast<grpc::Service*>(&server_service_), static_cast<grpc::Service*>(&admin_service_)})
     builder.RegisterService(service);
   server_ = builder.BuildAndStart();

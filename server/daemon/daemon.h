@@ -19,6 +19,7 @@
 #include "server/rpc/job_context.h"
 #include "server/rpc/jobs_service.h"
 #include "server/rpc/models_service.h"
+#include "server/rpc/registration_service.h"
 #include "server/rpc/server_service.h"
 #include "server/rpc/shapes_service.h"
 #include "server/security/security.h"
@@ -77,6 +78,7 @@ class Daemon {
   JobsService jobs_service_;
   ShapesService shapes_service_;
   CurvesService curves_service_;
+  RegistrationService registration_service_;
   ServerService server_service_;
   AdminService admin_service_;
   std::string address_;

@@ -3,8 +3,7 @@
 #include <algorithm>
 
 #include "core/io/file_error.h"
-#include "core/model/shell_pga_file.h"
-#include "core/model/shell_pga_tasks.h"
+#include "core/model/model_kinds.h"
 #include "server/errors/errors.h"
 #include "server/models/eviction.h"
 
@@ -181,10 +180,10 @@ ServedModelPtr ModelStore::read(const Key& key) {
     const Lock lock(mutex_);
     makeRoom(key, manifest.tensors_bytes);
   }
-  ShellPgaModelPtr model;
+  ShapeModelPtr model;
   const auto stored = directory_.load(name, signedVersion(version), [&](const StoredModel& unverified) {
-    model = loadShellPga(unverified);
-    warm(*model);
+    model = loadShapeModel(unverified);
+    model->warm();
   });
   const auto bytes = model->bytes();
   return std::make_shared<const ServedModel>(ServedModel{name, version, stored.manifest, std::move(model), bytes});
@@ -316,14 +315,14 @@ std::vector<ServedModelPtr> ModelStore::loaded() const {
   return models;
 }
 
-ServedModelPtr ModelStore::publish(const std::string& name, ShellPgaModelPtr model, const Provenance& provenance) {
+ServedModelPtr ModelStore::publish(const std::string& name, ShapeModelPtr model, const Provenance& provenance) {
   const Publishing publishing(*this, name);
-  const auto version = publishShellPga(directory_, name, *model, toJson(provenance));
+  const auto version = model->publish(directory_, name, toJson(provenance));
   return served({name, static_cast<std::uint64_t>(version)}, directory_.manifest(name, version), std::move(model));
 }
 
 /// A version that was published just now, in memory if the budget allows.
-ServedModelPtr ModelStore::served(const Key& key, ModelManifest manifest, ShellPgaModelPtr model) {
+ServedModelPtr ModelStore::served(const Key& key, ModelManifest manifest, ShapeModelPtr model) {
   const auto& [name, version] = key;
   const auto bytes = model->bytes();
   auto served =
@@ -343,7 +342,7 @@ ServedModelPtr ModelStore::served(const Key& key, ModelManifest manifest, ShellP
 
 std::unique_ptr<IncomingModel> ModelStore::receive(const std::string& name, std::string manifest_text) const {
   auto incoming = directory_.receive(name, std::move(manifest_text));
-  requireShellPga(incoming->manifest());
+  requireServable(incoming->manifest());
   if (const auto bytes = incoming->manifest().tensors_bytes; bytes > options_.memory_budget)
     throw overBudget(name, 0, bytes, options_.memory_budget);
   return incoming;
@@ -373,8 +372,8 @@ ServedModelPtr ModelStore::takeIn(IncomingModel& incoming, const std::stop_token
     const Lock lock(mutex_);
     makeRoom({incoming.name(), 0}, incoming.manifest().tensors_bytes);
   }
-  auto model = shellPgaFrom(incoming.manifest(), tensors);
-  warm(*model);
+  auto model = shapeModelFrom(incoming.manifest(), tensors);
+  model->warm();
   {
     const Lock lock(mutex_);
     makeRoom({incoming.name(), 0}, model->bytes());

@@ -78,7 +78,7 @@ class ModelStore {
 
   /// Writes a new version, for which its name stands afterwards; it is in memory if the budget allows. Throws FileError
   /// when the disk fails: nothing is left behind.
-  ServedModelPtr publish(const std::string& name, ShellPgaModelPtr model, const Provenance& provenance);
+  ServedModelPtr publish(const std::string& name, ShapeModelPtr model, const Provenance& provenance);
   /// Takes in a version from elsewhere (ModelDirectory::receive). Throws OverBudget when it can never fit into memory.
   std::unique_ptr<IncomingModel> receive(const std::string& name, std::string manifest_text) const;
   /// Starts to verify, build and warm what has come, and then publishes it as publish() does. The load throws
@@ -135,7 +135,7 @@ class ModelStore {
   void runLoad(const Key& key, const PendingModelPtr& pending);
   ServedModelPtr read(const Key& key);
   ServedModelPtr takeIn(IncomingModel& incoming, const std::stop_token& stop);
-  ServedModelPtr served(const Key& key, ModelManifest manifest, ShellPgaModelPtr model);
+  ServedModelPtr served(const Key& key, ModelManifest manifest, ShapeModelPtr model);
   void swapIn(const Key& key, const ServedModelPtr& model);
   void settle(const Key& key, Failure failure);
   void keep(const Key& key, ServedModelPtr model);

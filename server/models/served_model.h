@@ -5,7 +5,7 @@
 #include <string>
 
 #include "core/io/model_directory.h"
-#include "core/model/shell_pga_model.h"
+#include "core/model/shape_model.h"
 
 namespace shaped::server {
 
@@ -14,7 +14,7 @@ struct ServedModel {
   std::string name;
   std::uint64_t version = 0;
   ModelManifest manifest;
-  ShellPgaModelPtr shell_pga;
+  ShapeModelPtr shapes;   ///< what it answers with
   std::size_t bytes = 0;  ///< of memory, about
 };
 using ServedModelPtr = std::shared_ptr<const ServedModel>;

@@ -21,8 +21,8 @@ class BatchResult {
 
   /// The state that an earlier process has kept, as `read` makes it of the file; nothing when there is none, or it is
   /// damaged, which the log tells.
-  template <class State>
-  std::optional<State> find(State (*read)(const std::filesystem::path&)) const {
+  template <class Read>
+  auto find(const Read& read) const -> std::optional<decltype(read(std::filesystem::path()))> {
     if (!std::filesystem::exists(state_)) return std::nullopt;
     try {
       return read(state_);

@@ -4,6 +4,7 @@
 #include "core/numerics/error.h"
 #include "server/convert/model.h"
 #include "server/jobs/arena.h"
+#include "server/models/kind.h"
 #include "server/rpc/answer.h"
 #include "server/rpc/batch_result.h"
 
@@ -11,6 +12,7 @@ namespace shaped::server {
 namespace {
 
 constexpr int kMostSamples = 10000;
+constexpr const char* kEvaluation = "an evaluation";
 
 /// The dataset that is asked for, or the model's own.
 DatasetInfo datasetInfoFor(const ServedModel& model, const DatasetStore& datasets, const std::string& wanted) {
@@ -56,7 +58,7 @@ double areaRatio(const ShellPgaModel& model, const Dataset& dataset) {
 JobResult run(const JobContext& context, const JobRun& run) {
   const auto request = requestOf<v1::EvaluateJobRequest>(run.job).evaluate();
   const auto served = pinForJob(context, run, request.model());
-  const auto& model = *served->shell_pga;
+  const auto& model = shellPgaFor(kEvaluation, *served);
   const auto dataset = context.datasets.load(datasetInfoFor(*served, context.datasets, request.dataset()).name);
   BatchResult result(context, run, "Jobs.Evaluate", fingerprintOf(dataset));
   result.open(0);
@@ -81,7 +83,7 @@ JobResult run(const JobContext& context, const JobRun& run) {
 void evaluate(ModelStore& models, DatasetStore& datasets, int threads, const v1::EvaluateRequest& request,
               v1::EvaluateResponse& response, Call& call) {
   const auto served = pinModel(models, request, call);
-  const auto& model = *served->shell_pga;
+  const auto& model = shellPgaFor(kEvaluation, *served);
   const auto dataset = datasets.load(datasetInfoFor(*served, datasets, request.dataset()).name);
   const auto options = optionsFrom(request, model, call.stopToken());
   Solved<ShellPgaEvaluation> solved;
@@ -105,8 +107,8 @@ JobRecord startEvaluation(const JobDesk& desk, v1::EvaluateJobRequest request, C
   } else {
     const auto served = pinModel(desk.context.models, wanted, call);
     const auto info = datasetInfoFor(*served, desk.context.datasets, wanted.dataset());
-    requireEvaluable(*served->shell_pga, static_cast<std::size_t>(info.frames),
-                     optionsFrom(wanted, *served->shell_pga, {}));
+    const auto& model = shellPgaFor(kEvaluation, *served);
+    requireEvaluable(model, static_cast<std::size_t>(info.frames), optionsFrom(wanted, model, {}));
     nameVersion(*served, *wanted.mutable_model());
     wanted.set_dataset(info.name);
   }

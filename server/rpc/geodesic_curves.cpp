@@ -32,7 +32,7 @@ TopologyPtr topologyOf(const TopologySources& sources, const v1::CurveTopology& 
     case v1::CurveTopology::kModel: {
       const auto model = sources.models.pin(selectorFromProto(message.model()));
       call.setModel(model->name, model->version);
-      return model->shell_pga->topologyPtr();
+      return model->shapes->topologyPtr();
     }
     case v1::CurveTopology::kFaces:
       return ownTopology(message.faces(), sources.limits);

@@ -78,7 +78,7 @@ void repeatVersion(const v1::ModelSelector& known, v1::ModelSelector& model) {
 std::string textOf(const v1::ModelSelector& model) { return model.name() + "@" + std::to_string(model.version()); }
 
 void requireConnectivity(const ServedModel& model, const DatasetInfo& dataset) {
-  if (dataset.topology_id != model.shell_pga->topology().id())
+  if (dataset.topology_id != model.shapes->topology().id())
     throw InvalidInput("dataset", "\"" + dataset.name + "\" has another connectivity than the model");
 }
 

@@ -3,7 +3,6 @@
 #include <optional>
 #include <sstream>
 
-#include "core/model/marker_fitter_checkpoint.h"
 #include "core/numerics/error.h"
 #include "server/convert/job.h"
 #include "server/rpc/answer.h"
@@ -17,7 +16,7 @@ using Header = v1::FitMarkersJobRequest::Header;
 
 /// What a job was asked.
 struct Take {
-  std::string hash;          ///< of the frames
+  std::string hash;  ///< of the frames
   std::int64_t frames = 0;
   Header header;
 
@@ -58,31 +57,28 @@ JobResult run(const JobContext& context, const JobRun& run) {
   const auto take = takeOf(run.job);
   const auto& setup = take.header.setup();
   const auto served = pinForJob(context, run, setup.model());
-  MarkerSession session(served, setup, context.limits, run.stop);
+  std::optional<MarkerSession> session(std::in_place, served, setup, context.limits, run.stop);
   BatchResult result(context, run, "Jobs.FitMarkers", take.hash);
-  auto from = result.find(&readFitterCheckpoint);
-  if (from && from->frames == 0) from.reset();  // before the calibration, which belongs to the first frame
-  if (!result.open(from ? from->frames : 0)) from.reset();
-  FrameFile frames(run);
-  if (from) {
-    session.resume(from->state);
-    frames.skip(from->frames);
+  auto from = result.find([&](const auto& path) { return session->resume(path); }).value_or(0);
+  if (!result.open(from) || from == 0) {
+    from = 0;
+    session.emplace(served, setup, context.limits, run.stop);  // as if it had not resumed
   }
-  run.resumed(from ? "frame " + std::to_string(from->frames) : "");
-  const auto keep = [&] {
-    result.offer([&](const auto& path) { writeFitterCheckpoint(path, {result.count(), session.state()}); });
-  };
+  FrameFile frames(run);
+  frames.skip(from);
+  run.resumed(from > 0 ? "frame " + std::to_string(from) : "");
+  const auto keep = [&] { result.offer([&](const auto& path) { session->state()(path, result.count()); }); };
   v1::GetJobResultResponse answer;
   while (result.count() < take.frames) {
     run.progress({"frame " + std::to_string(result.count() + 1) + " of " + std::to_string(take.frames),
                   static_cast<double>(result.count()) / static_cast<double>(take.frames), 0});
     answer.Clear();
     auto& response = *answer.mutable_fit_markers();
-    const auto before = session.state();  // what a stop in the middle of a frame must not change
+    const auto before = session->state();  // what a stop in the middle of a frame must not change
     const auto begin = std::chrono::steady_clock::now();
-    const auto solved = session.fit(frames.next(), response);
+    const auto solved = session->fit(frames.next(), response);
     if (run.stop.stop_requested()) {
-      result.offer([&](const auto& path) { writeFitterCheckpoint(path, {result.count(), before}); });
+      result.offer([&](const auto& path) { before(path, result.count()); });
       return result.stopped();
     }
     const std::chrono::duration<double> seconds = std::chrono::steady_clock::now() - begin;

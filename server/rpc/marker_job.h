@@ -9,8 +9,8 @@ namespace shaped::server {
 
 inline constexpr const char* kFitMarkers = "fit_markers";
 
-/// How a job of kind kFitMarkers is done. Its request begins with what its frames are, which lie in the job's input: their
-/// hash and number, a line; then a serialised FitMarkersJobRequest.Header.
+/// How a job of kind kFitMarkers is done. Its request begins with what its frames are, which lie in the job's input:
+/// their hash and number, a line; then a serialised FitMarkersJobRequest.Header.
 JobKind markerFit(const JobContext& context);
 
 /// Jobs.FitMarkers: takes in the frames, and starts the job when all have come.

@@ -11,14 +11,13 @@
 namespace shaped::server {
 namespace {
 
-MarkerTrackerOptions optionsFrom(const v1::FitMarkersRequest::Setup& setup, const ShellPgaModel& model,
-                                 std::stop_token stop) {
-  MarkerTrackerOptions options;
+TakeOptions optionsFrom(const v1::FitMarkersRequest::Setup& setup, const ShapeModel& model, std::stop_token stop) {
+  TakeOptions options;
   if (setup.prior_weight() != 0) options.prior_weight = setup.prior_weight();
   if (setup.has_robust_scale()) options.robust_scale = setup.robust_scale();
   if (setup.scale() != 0) options.scale = setup.scale();
-  options.submanifold.modes = countFromProto(setup.modes(), model.modes(), "setup.modes");
-  options.submanifold.stop = std::move(stop);
+  options.modes = countFromProto(setup.modes(), model.modes(), "setup.modes");
+  options.stop = std::move(stop);
   return options;
 }
 
@@ -34,8 +33,8 @@ MarkerSession::MarkerSession(ServedModelPtr served, const v1::FitMarkersRequest:
     : served_(std::move(served)),
       marker_count_(std::ssize(markersIn(setup, limits).markers)),
       with_shapes_(!setup.without_shapes()),
-      fitter_(served_->shell_pga, markersIn(setup, limits),
-              optionsFrom(setup, *served_->shell_pga, std::move(stop))) {
+      fitter_(served_->shapes->takeFitter(markersIn(setup, limits),
+                                          optionsFrom(setup, *served_->shapes, std::move(stop)))) {
   requireAtMost(setup.calibration_size(), limits.calibration_frames, "setup.calibration", "frames");
   for (int i = 0; i < setup.calibration_size(); ++i)
     calibration_.push_back(
@@ -46,26 +45,27 @@ MarkerPositions MarkerSession::positionsIn(const v1::MarkerFrame& frame) const {
   return markersFromProto(frame, marker_count_);
 }
 
-Solved<FittedFrame> MarkerSession::fit(const v1::MarkerFrame& frame, v1::FitMarkersResponse& response) {
+Solved<TakeFrame> MarkerSession::fit(const v1::MarkerFrame& frame, v1::FitMarkersResponse& response) {
   const auto markers = positionsIn(frame);
-  const Outcome calibrated = fitter_.calibrate(std::exchange(calibration_, {}));
+  const Outcome calibrated = fitter_->calibrate(std::exchange(calibration_, {}));
   if (calibrated.termination == Termination::kCancelled) throw Stopped();
-  auto solved = fitter_.fit(markers);
+  auto solved = fitter_->fit(markers);
   solved.iterations += calibrated.iterations;
   const auto& fitted = solved.solution;
   response.set_frame(frame.frame());
-  if (with_shapes_) toProto(fitted.shape, served_->shell_pga->topology(), *response.mutable_shape());
-  toProto(fitted.fit.point, *response.mutable_coefficients());
-  response.mutable_residuals()->Add(fitted.fit.residuals.begin(), fitted.fit.residuals.end());
-  response.set_rms(fitted.fit.rms);
-  response.set_scale(fitted.fit.scale);
-  response.set_held(fitted.fit.held);
+  if (with_shapes_) toProto(fitted.shape, served_->shapes->topology(), *response.mutable_shape());
+  toProto(fitted.point, *response.mutable_coefficients());
+  response.mutable_residuals()->Add(fitted.residuals.begin(), fitted.residuals.end());
+  response.set_rms(fitted.rms);
+  response.set_scale(fitted.scale);
+  response.set_held(fitted.held);
   return solved;
 }
 
-void MarkerSession::resume(MarkerTrackerState state) {
-  fitter_.resume(std::move(state));
-  calibration_.clear();
+std::int64_t MarkerSession::resume(const std::filesystem::path& path) {
+  const auto frames = fitter_->resume(path);
+  if (frames > 0) calibration_.clear();  // which belongs to the first frame
+  return frames;
 }
 
 }  // namespace shaped::server

@@ -1,9 +1,10 @@
 #pragma once
 
+#include <memory>
 #include <stop_token>
 #include <vector>
 
-#include "core/model/marker_fitter.h"
+#include "core/model/take_fitter.h"
 #include "server/convert/limits.h"
 #include "server/models/model_store.h"
 #include "shaped/v1/shapes.pb.h"
@@ -25,17 +26,19 @@ class MarkerSession {
   /// Fits the next frame; the first answer reports the calibration's iterations too. Fills what is particular to the
   /// frame into the response. Throws Stopped when the token fired during the calibration; InvalidInput naming the
   /// frame's field, or setup.calibration.
-  Solved<FittedFrame> fit(const v1::MarkerFrame& frame, v1::FitMarkersResponse& response);
+  Solved<TakeFrame> fit(const v1::MarkerFrame& frame, v1::FitMarkersResponse& response);
 
-  MarkerTrackerState state() const { return fitter_.state(); }
-  /// Goes on behind frames that a session of the same setup has fitted.
-  void resume(MarkerTrackerState state);
+  /// As TakeFitter::state.
+  TakeFitter::Keep state() const { return fitter_->state(); }
+  /// Goes on behind the frames that a session of the same setup has fitted, and returns their number:
+  /// TakeFitter::resume.
+  std::int64_t resume(const std::filesystem::path& path);
 
  private:
   const ServedModelPtr served_;
   const Eigen::Index marker_count_;
   const bool with_shapes_;
-  MarkerFitter fitter_;
+  const std::unique_ptr<TakeFitter> fitter_;
   std::vector<MarkerPositions> calibration_;  ///< frames that are still to tell the subject's size
 };
 

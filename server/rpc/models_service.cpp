@@ -37,7 +37,7 @@ grpc::ServerUnaryReactor* ModelsService::Get(grpc::CallbackServerContext* contex
         const auto model = pinModel(store_, wanted, call);
         toProto(*model, *answer.mutable_description());
         toProto(store_.standing(model->name, model->version), *answer.mutable_description());
-        if (wanted.with_mean()) toProto(model->shell_pga->mean(), model->shell_pga->topology(), *answer.mutable_mean());
+        if (wanted.with_mean()) toProto(model->shapes->mean(), model->shapes->topology(), *answer.mutable_mean());
       });
 }
 

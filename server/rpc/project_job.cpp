@@ -12,7 +12,7 @@
 namespace shaped::server {
 namespace {
 
-ProjectionOptions optionsFrom(const v1::ProjectJobRequest& request, const ShellPgaModel& model, std::stop_token stop) {
+ProjectionOptions optionsFrom(const v1::ProjectJobRequest& request, const ShapeModel& model, std::stop_token stop) {
   return {.modes = countFromProto(request.modes(), model.modes(), "modes"),
           .fine = request.fine(),
           .stop = std::move(stop)};
@@ -23,10 +23,10 @@ std::vector<v1::GetJobResultResponse> answersFrom(std::size_t first, const Serve
                                                   const v1::ProjectJobRequest& request, const JobRun& run) {
   const auto together = 2 * static_cast<std::size_t>(tbb::this_task_arena::max_concurrency());
   std::vector<v1::GetJobResultResponse> answers(std::min(together, dataset.shapes.size() - first));
-  const auto options = optionsFrom(request, *served.shell_pga, run.stop);
+  const auto options = optionsFrom(request, *served.shapes, run.stop);
   tbb::parallel_for(std::size_t{0}, answers.size(), [&](std::size_t i) {
     const auto begin = std::chrono::steady_clock::now();
-    const auto solved = project(*served.shell_pga, dataset.shapes[first + i], options);
+    const auto solved = served.shapes->project(dataset.shapes[first + i], options);
     const std::chrono::duration<double> seconds = std::chrono::steady_clock::now() - begin;
     auto& response = *answers[i].mutable_project();
     fillAnswer(served, solved, seconds.count(), solved.solution.smallest_area_ratio, response);
@@ -71,7 +71,7 @@ JobRecord startProjection(const JobDesk& desk, v1::ProjectJobRequest request, Ca
   } else {
     const auto served = pinModel(desk.context.models, request, call);
     requireConnectivity(*served, desk.context.datasets.get(request.dataset()));
-    optionsFrom(request, *served->shell_pga, {});
+    optionsFrom(request, *served->shapes, {});
     nameVersion(*served, *request.mutable_model());
   }
   auto job = newJob(kProject, request.SerializeAsString(), request.request_id());

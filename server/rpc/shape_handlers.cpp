@@ -1,8 +1,10 @@
 #include "server/rpc/shape_handlers.h"
 
+#include "core/model/shell_pga_tasks.h"
 #include "core/numerics/error.h"
 #include "server/convert/mesh.h"
 #include "server/convert/model.h"
+#include "server/models/kind.h"
 #include "server/rpc/answer.h"
 
 namespace shaped::server {
@@ -20,10 +22,10 @@ Handle handleFromProto(const v1::Handle& message, const Topology& topology, std:
 
 }  // namespace
 
-void fill(const ServedModel& served, const ShellPgaProjection& projection, bool with_shape,
+void fill(const ServedModel& served, const ShapeProjection& projection, bool with_shape,
           v1::ProjectResponse& response) {
-  if (with_shape) toProto(projection.shape, served.shell_pga->topology(), *response.mutable_shape());
-  toProto(projection.coefficients, *response.mutable_coefficients());
+  if (with_shape) toProto(projection.shape, served.shapes->topology(), *response.mutable_shape());
+  toProto(projection.point, *response.mutable_coefficients());
   response.mutable_tangent_coordinates()->Add(projection.tangent_coordinates.begin(),
                                               projection.tangent_coordinates.end());
   response.set_residual_energy(projection.residual_energy);
@@ -32,12 +34,12 @@ void fill(const ServedModel& served, const ShellPgaProjection& projection, bool 
 
 void project(ModelStore& store, const v1::ProjectRequest& request, v1::ProjectResponse& response, Call& call) {
   const auto served = pinModel(store, request, call);
-  const auto& model = *served->shell_pga;
+  const auto& model = *served->shapes;
   const auto shape = shapeFromProto(request.shape(), model.topology(), "shape");
   const ProjectionOptions options{.modes = countFromProto(request.modes(), model.modes(), "modes"),
                                   .fine = request.fine(),
                                   .stop = call.stopToken()};
-  const auto solved = project(model, shape, options);
+  const auto solved = model.project(shape, options);
   setAnswer(*served, solved, solved.solution.smallest_area_ratio, call, response);
   fill(*served, solved.solution, true, response);
 }
@@ -45,9 +47,9 @@ void project(ModelStore& store, const v1::ProjectRequest& request, v1::ProjectRe
 void synthesize(ModelStore& store, const Limits& limits, const v1::SynthesizeRequest& request,
                 v1::SynthesizeResponse& response, Call& call) {
   const auto served = pinModel(store, request, call);
-  const auto& model = *served->shell_pga;
-  const auto solved = synthesize(model, coefficientsFromProto(request.coefficients(), limits),
-                                 {.fine = request.fine(), .stop = call.stopToken()});
+  const auto& model = *served->shapes;
+  const auto solved = model.synthesize(coefficientsFromProto(request.coefficients(), limits),
+                                       {.fine = request.fine(), .stop = call.stopToken()});
   setAnswer(*served, solved, solved.solution.smallest_area_ratio, call, response);
   toProto(solved.solution.shape, model.topology(), *response.mutable_shape());
 }
@@ -55,7 +57,7 @@ void synthesize(ModelStore& store, const Limits& limits, const v1::SynthesizeReq
 void edit(ModelStore& store, const Limits& limits, const v1::EditRequest& request, v1::EditResponse& response,
           Call& call) {
   const auto served = pinModel(store, request, call);
-  const auto& model = *served->shell_pga;
+  const auto& model = shellPgaFor("Shapes.Edit", *served);
   requireAtMost(request.handles_size(), limits.handles, "handles", "handles");
   std::vector<Handle> handles;
   for (const auto& handle : request.handles())
@@ -75,9 +77,9 @@ void edit(ModelStore& store, const Limits& limits, const v1::EditRequest& reques
 
 void score(ModelStore& store, const v1::ScoreRequest& request, v1::ScoreResponse& response, Call& call) {
   const auto served = pinModel(store, request, call);
-  const auto& model = *served->shell_pga;
+  const auto& model = *served->shapes;
   const auto shape = shapeFromProto(request.shape(), model.topology(), "shape");
-  const auto solved = project(model, shape, ProjectionOptions{.modes = 0, .fine = false, .stop = call.stopToken()});
+  const auto solved = model.project(shape, {.modes = 0, .fine = false, .stop = call.stopToken()});
   setAnswer(*served, solved, solved.solution.smallest_area_ratio, call, response);
   toProto(solved.solution.score, *response.mutable_score());
 }

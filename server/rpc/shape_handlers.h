@@ -1,6 +1,6 @@
 #pragma once
 
-#include "core/model/shell_pga_tasks.h"
+#include "core/model/shape_model.h"
 #include "server/convert/limits.h"
 #include "server/models/model_store.h"
 #include "server/rpc/call.h"
@@ -16,9 +16,7 @@ void edit(ModelStore& store, const Limits& limits, const v1::EditRequest& reques
           Call& call);
 void score(ModelStore& store, const v1::ScoreRequest& request, v1::ScoreResponse& response, Call& call);
 
-
 /// What Project answers beside what every answer carries.
-void fill(const ServedModel& served, const ShellPgaProjection& projection, bool with_shape,
-          v1::ProjectResponse& response);
+void fill(const ServedModel& served, const ShapeProjection& projection, bool with_shape, v1::ProjectResponse& response);
 
 }  // namespace shaped::server

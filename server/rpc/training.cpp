@@ -1,11 +1,13 @@
 #include "server/rpc/training.h"
 
 #include "core/mesh/quality.h"
+#include "core/model/shell_pga_shapes.h"
 #include "core/model/shell_pga_training.h"
 #include "core/numerics/error.h"
 #include "server/convert/model.h"
 #include "server/datasets/name.h"
 #include "server/errors/errors.h"
+#include "server/rpc/body_training.h"
 #include "server/telemetry/call_log.h"
 
 namespace shaped::server {
@@ -110,11 +112,28 @@ JobResult train(const JobContext& context, const JobRun& run) {
   patiently(context, run, [&] { run.solved(result); });
   auto record = trained.solution->parts().training;
   record.seconds = result.seconds;
-  const auto model = trained.solution->withRecord(record);
+  const auto model = std::make_shared<const ShellPgaShapes>(trained.solution->withRecord(record));
   const Provenance provenance{request.dataset(), std::chrono::system_clock::now(), run.job.id, run.job.key};
   patiently(context, run,
             [&] { result.model_version = context.models.publish(request.model_name(), model, provenance)->version; });
   return result;
+}
+
+const char* kindOf(const v1::TrainRequest& request) {
+  switch (request.method_case()) {
+    case v1::TrainRequest::kShellPga:
+      return kTrainShellPga;
+    case v1::TrainRequest::kBody:
+      return kTrainBody;
+    case v1::TrainRequest::METHOD_NOT_SET:
+      break;
+  }
+  throw InvalidInput("method", "is missing; want shell_pga or body");
+}
+
+void requireTrainable(const v1::TrainRequest& request, const DatasetInfo& dataset) {
+  request.has_body() ? server::requireTrainable(request.body(), dataset)
+                     : static_cast<void>(optionsFrom(request.shell_pga(), dataset));
 }
 
 }  // namespace
@@ -127,10 +146,10 @@ JobKind shellPgaTraining(const JobContext& context) {
 JobRecord startTraining(const JobDesk& desk, const v1::TrainRequest& request) {
   const auto known = earlierJob(desk, request.request_id());
   requireName(request.model_name(), "model_name");
-  if (!request.has_shell_pga()) throw InvalidInput("method", "is missing; want shell_pga");
+  const auto* kind = kindOf(request);
   // A repeated request has its answer even if its dataset has been deleted since.
-  if (!known) optionsFrom(request.shell_pga(), desk.context.datasets.get(request.dataset()));
-  auto wanted = newJob(kTrainShellPga, request.SerializeAsString(), request.request_id());
+  if (!known) requireTrainable(request, desk.context.datasets.get(request.dataset()));
+  auto wanted = newJob(kind, request.SerializeAsString(), request.request_id());
   wanted.model_name = request.model_name();
   wanted.dataset = request.dataset();
   return desk.runner.start(std::move(wanted));

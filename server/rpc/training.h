@@ -9,8 +9,8 @@ inline constexpr const char* kTrainShellPga = "train_shell_pga";
 /// How a job of kind kTrainShellPga is done: its request is a serialised TrainRequest.
 JobKind shellPgaTraining(const JobContext& context);
 
-/// Checks the request and starts its job. Throws InvalidInput naming the field, NotFound for the dataset, Busy,
-/// AlreadyExists for a request_id of another request.
+/// Checks a request of any method and starts its job. Throws InvalidInput naming the field, NotFound for the dataset,
+/// Busy, AlreadyExists for a request_id of another request.
 JobRecord startTraining(const JobDesk& desk, const v1::TrainRequest& request);
 
 }  // namespace shaped::server

@@ -54,6 +54,8 @@ const std::map<std::string_view, std::vector<Role>>& methods() {
       {"/shaped.v1.Curves/Geodesic", {Role::kInfer}},
       {"/shaped.v1.Curves/Bezier", {Role::kInfer}},
       {"/shaped.v1.Curves/Join", {Role::kInfer}},
+      {"/shaped.v1.Registration/Register", {Role::kInfer}},
+      {"/shaped.v1.Registration/RegisterSequence", {Role::kInfer}},
   };
   return table;
 }

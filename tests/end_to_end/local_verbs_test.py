@@ -65,7 +65,7 @@ class LocalVerbs(unittest.TestCase):
         names = sorted(str(path.relative_to(self.sample)) for path in self.sample.rglob("*") if path.is_file())
         self.assertEqual(names, ["bodies.npy", "bodies/body_000.ply", "bodies/body_001.ply", "handles.csv", "held_out.ply",
                                  "markers/marker_set.json", "markers/trial.csv", "markers/truth.npy", "poses.npy",
-                                 "poses/pose_000.ply", "poses/pose_001.ply", "poses/pose_002.ply", "template.ply"])
+                                 "poses/pose_000.ply", "poses/pose_001.ply", "poses/pose_002.ply", "rig.json", "template.ply"])
         self.assertEqual(numpy.load(self.sample / "poses.npy").shape, (3, count, 3))
         self.assertEqual(numpy.load(self.sample / "bodies.npy").shape, (2, count, 3))
         self.assertEqual(numpy.load(self.sample / "markers/truth.npy").shape, (8, count, 3))

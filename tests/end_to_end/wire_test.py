@@ -26,7 +26,7 @@ class Wire(DaemonCase):
         method = self.channel.stream_stream("/grpc.reflection.v1alpha.ServerReflection/ServerReflectionInfo",
                                             lambda data: data, lambda data: data)
         answer = next(method(iter([list_services]), timeout=10))
-        for service in ("Models", "Datasets", "Jobs", "Shapes", "Curves", "Server", "Admin"):
+        for service in ("Models", "Datasets", "Jobs", "Shapes", "Curves", "Registration", "Server", "Admin"):
             self.assertIn(b"shaped.v1." + service.encode(), answer)
 
     def test_limits_are_told(self):
@@ -48,7 +48,8 @@ class Wire(DaemonCase):
         one, many = (lambda data: data), (lambda data: iter([data]))
         for kind, method, wrap in (("unary_unary", "Models/Get", one), ("unary_unary", "Jobs/Wait", one), ("unary_stream", "Jobs/Watch", one),
                                    ("unary_stream", "Shapes/Interpolate", one), ("stream_unary", "Datasets/Upload", many),
-                                   ("stream_stream", "Shapes/FitMarkers", many)):
+                                   ("stream_stream", "Shapes/FitMarkers", many), ("unary_unary", "Registration/Register", one),
+                                   ("stream_stream", "Registration/RegisterSequence", many)):
             with self.subTest(method), self.assertRaises(grpc.RpcError) as raised:
                 answer = getattr(self.channel, kind)("/shaped.v1." + method)(wrap(b"\xff\xff\xff"), timeout=10)
                 list(answer)  # of a stream

@@ -1,5 +1,7 @@
 #include "tests/fuzz/small_model.h"
 
+#include <algorithm>
+
 #include "tests/support/shapes.h"
 
 namespace shaped::fuzz {
@@ -32,7 +34,34 @@ ShellPgaParts makeParts() {
   return parts;
 }
 
+/// The upper half of a ball turns against the lower one.
+BodyModel makeBody() {
+  const auto ball = test::icosphere(1);
+  const auto vertices = ball.vertices.rows();
+  Skeleton skeleton({{"root", -1}, {"top", 0}});
+  SkinWeights weights(vertices, 2);
+  for (Eigen::Index v = 0; v < vertices; ++v) {
+    const double share = std::clamp(0.5 + ball.vertices(v, 2), 0.0, 1.0);
+    if (share < 1) weights.insert(v, 0) = 1 - share;
+    if (share > 0) weights.insert(v, 1) = share;
+  }
+  weights.makeCompressed();
+  const Rig rig{skeleton, Vertices::Zero(2, 3), weights, std::nullopt};
+  Eigen::MatrixXd modes = Eigen::MatrixXd::Zero(3 * vertices, 2);
+  for (Eigen::Index v = 0; v < vertices; ++v)
+    for (const int axis : {0, 1}) modes(3 * v + axis, axis) = ball.vertices(v, axis);
+  modes.colwise().normalize();
+  return BodyModel({ball.topology, ball.vertices, modes, Eigen::Vector2d(0.2, 0.1), skeleton, weights,
+                    clusterRegressor(rig, ball.vertices),
+                    JointLimits{Vertices::Constant(2, 3, -1), Vertices::Constant(2, 3, 2)}});
+}
+
 }  // namespace
+
+const BodyModel& smallBody() {
+  static const BodyModel model = makeBody();
+  return model;
+}
 
 ShellPgaModelPtr smallModel() {
   static const auto model = std::make_shared<const ShellPgaModel>(makeParts());

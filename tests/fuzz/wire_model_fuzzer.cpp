@@ -1,6 +1,6 @@
 #include <stop_token>
 
-#include "core/model/shell_pga_tasks.h"
+#include "core/model/shell_pga_shapes.h"
 #include "server/convert/model.h"
 #include "tests/fuzz/small_model.h"
 #include "tests/fuzz/wire.h"
@@ -18,11 +18,16 @@ FUZZ_WIRE_TARGET(wire_model, shaped::v1::Coefficients) {
   v1::Coefficients back;
   server::toProto(point, back);
   v1::Coefficients known;  // without fields of other versions
-  known.mutable_alpha()->CopyFrom(message->alpha());
-  known.set_scale(message->scale());
+  if (message->body_size() > 0) {
+    known.mutable_body()->CopyFrom(message->body());
+  } else {
+    known.mutable_alpha()->CopyFrom(message->alpha());
+    known.set_scale(message->scale());
+  }
   require(back.SerializeAsString() == known.SerializeAsString(), "coefficients survive");
   // Solving is not what is tested, and a far shape takes seconds: an abandoned request is checked and then ends.
   std::stop_source abandoned;
   abandoned.request_stop();
-  accepted<InvalidInput>([&] { return synthesize(*smallModel(), point, {.stop = abandoned.get_token()}); });
+  accepted<InvalidInput>(
+      [&] { return ShellPgaShapes(smallModel()).synthesize(point, {.fine = false, .stop = abandoned.get_token()}); });
 }

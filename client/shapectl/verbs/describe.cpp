@@ -1,5 +1,4 @@
 #include <algorithm>
-
 #include <iostream>
 
 #include "client/shapectl/model_output.h"
@@ -10,24 +9,42 @@
 namespace shaped::shapectl {
 namespace {
 
-void printText(const v1::ModelDescription& model) {
-  const auto& pga = model.shell_pga();
-  std::cout << modelText(model.model()) << "  (" << model.kind() << ", " << timeText(model.created()) << ")\n"
-            << "  mesh         " << model.vertex_count() << " vertices, " << model.face_count() << " faces, topology "
-            << model.topology_id() << "\n"
-            << "  training     " << pga.training_shapes() << " shapes of dataset " << model.dataset() << "; "
-            << reportText(model.training()) << "\n"
-            << "  modes        " << pga.modes() << "\n"
+/// As many as were kept, and how many there were.
+void printVariances(const char* name, const google::protobuf::RepeatedField<double>& values, std::uint32_t kept) {
+  std::cout << "  " << name;
+  const int shown = std::min(values.size(), static_cast<int>(kept));
+  for (int j = 0; j < shown; ++j) std::cout << " " << values[j];
+  std::cout << " m^2";
+  if (shown < values.size()) std::cout << ", and " << values.size() - shown << " smaller ones";
+  std::cout << "\n";
+}
+
+void printText(const v1::ModelDescription::ShellPga& pga) {
+  std::cout << "  modes        " << pga.modes() << "\n"
             << "  path steps   " << pga.path_steps() << "\n"
             << "  coarse mesh  " << pga.coarse_vertices() << " vertices\n"
             << "  bending      " << pga.bending() << " m^2\n"
-            << "  path energy  " << pathEnergyText(pga.path_energy()) << "\n"
-            << "  eigenvalues ";
-  const int shown = std::min(pga.eigenvalues_size(), static_cast<int>(pga.modes()));
-  for (int j = 0; j < shown; ++j) std::cout << " " << pga.eigenvalues(j);
-  std::cout << " m^2";
-  if (shown < pga.eigenvalues_size()) std::cout << ", and " << pga.eigenvalues_size() - shown << " smaller ones";
+            << "  path energy  " << pathEnergyText(pga.path_energy()) << "\n";
+  printVariances("eigenvalues ", pga.eigenvalues(), pga.modes());
+}
+
+void printText(const v1::ModelDescription::Body& body) {
+  std::cout << "  modes        " << body.modes() << "\n"
+            << "  posture      " << nameOf(body.posture()) << "\n"
+            << "  joints       " << body.joints_size() << (body.limits() ? ", with limits:" : ", without limits:");
+  for (const auto& joint : body.joints()) std::cout << " " << joint.name();
   std::cout << "\n";
+  printVariances("variances   ", body.variances(), body.modes());
+}
+
+void printText(const v1::ModelDescription& model) {
+  std::cout << modelText(model.model()) << "  (" << model.kind() << ", " << timeText(model.created()) << ")\n"
+            << "  mesh         " << model.vertex_count() << " vertices, " << model.face_count() << " faces, topology "
+            << model.topology_id() << "\n"
+            << "  training     " << sizeOf(model).training_shapes << " shapes of dataset " << model.dataset() << "; "
+            << reportText(model.training()) << "\n";
+  if (model.has_shell_pga()) printText(model.shell_pga());
+  if (model.has_body()) printText(model.body());
 }
 
 struct Describe {

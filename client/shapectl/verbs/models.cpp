@@ -32,11 +32,12 @@ struct Models {
               << "VERTICES" << std::setw(8) << "SHAPES" << std::setw(7) << "MODES"
               << "  " << std::left << std::setw(21) << "CREATED"
               << "  STATE\n";
-    for (const auto& model : response.models())
+    for (const auto& model : response.models()) {
+      const auto size = sizeOf(model);
       std::cout << std::left << std::setw(32) << modelText(model.model()) << std::setw(11) << model.kind() << std::right
-                << std::setw(9) << model.vertex_count() << std::setw(8) << model.shell_pga().training_shapes()
-                << std::setw(7) << model.shell_pga().modes() << "  " << timeText(model.created()) << "  "
-                << stateText(model) << "\n";
+                << std::setw(9) << model.vertex_count() << std::setw(8) << size.training_shapes << std::setw(7)
+                << size.modes << "  " << timeText(model.created()) << "  " << stateText(model) << "\n";
+    }
   }
 };
 

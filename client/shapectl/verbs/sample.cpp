@@ -12,8 +12,10 @@
 #include "core/io/marker_file.h"
 #include "core/io/marker_set_file.h"
 #include "core/io/mesh_file.h"
+#include "core/io/rig_file.h"
 #include "core/numerics/error.h"
 #include "core/sample/creature.h"
+#include "core/sample/creature_rig.h"
 #include "core/sample/marker_trial.h"
 #include "core/sample/motion.h"
 
@@ -63,6 +65,7 @@ struct Sample {
     const fs::path root(folder);
     makeFolder(root);
     writeMesh(root / "template.ply", creature.rest, creature.topology->faces());
+    writeRig(root / "rig.json", rigOf(creature));
     bar.show(0.3, "poses");
     writePoses(root, creature, session);
     bar.show(0.6, "bodies");
@@ -135,7 +138,7 @@ struct Sample {
     if (session.json) return printJson(written);
     std::cout << folder << ": a creature of " << written["vertices"] << " vertices and " << written["faces"]
               << " faces\n"
-              << "  template.ply, held_out.ply, handles.csv (of held_out.ply)\n";
+              << "  template.ply, rig.json, held_out.ply, handles.csv (of held_out.ply)\n";
     if (poses > 0) std::cout << "  poses.npy, poses/: " << poses << " poses\n";
     if (bodies > 0) std::cout << "  bodies.npy, bodies/: " << bodies << " individuals\n";
     if (markers)

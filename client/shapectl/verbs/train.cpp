@@ -3,6 +3,7 @@
 #include "client/shapectl/job_output.h"
 #include "client/shapectl/job_run.h"
 #include "client/shapectl/numbers.h"
+#include "client/shapectl/train_method.h"
 #include "client/shapectl/verbs/verbs.h"
 
 namespace shaped::shapectl {
@@ -11,35 +12,35 @@ namespace {
 struct Train {
   std::string method, name, template_file, frames_file;
   std::vector<std::string> meshes;
-  std::int64_t modes = 0, path_steps = 0, coarse_vertices = 0;
-  double bending = 0;
-  bool publish_unconverged = false, directed = false, detach = false;
+  std::int64_t modes = 0;
+  bool detach = false;
+  std::vector<std::unique_ptr<TrainMethod>> methods = trainMethods();
 
   void declare(Arguments& arguments) {
-    arguments.positional("METHOD", method, "shell-pga");
+    arguments.positional("METHOD", method, "shell-pga, or body: identity and pose of registered shapes");
     arguments.positional("NAME", name, "The model to make; an existing name gets a new version");
     arguments.positionals("MESH", meshes, 0, "Training meshes of one connectivity (OBJ, PLY, OFF, STL), in metres");
     arguments.option("--template", template_file, "T.ply", "With --frames: the mesh that gives the connectivity");
     arguments.option("--frames", frames_file, "F.npy", "With --template: the shapes, n x V x 3, in metres");
-    arguments.option("--modes", modes, "J", "Principal variations, 1 to n - 1 (20)");
-    arguments.option("--path-steps", path_steps, "K", "Steps of each discrete geodesic (4)");
-    arguments.option("--bending", bending, "ETA", "Bending weight [m^2] (2.5e-5 times the squared diameter)");
-    arguments.option("--coarse-vertices", coarse_vertices, "N", "Solve on a mesh of at most so many vertices (1000)");
-    arguments.flag("--directed", directed, "Let distances count one direction of the energy, as in the paper (both)");
-    arguments.flag("--publish-unconverged", publish_unconverged, "Publish the model even if it did not converge");
+    arguments.option("--modes", modes, "J",
+                     "Principal variations, 1 to n - 1 (20; of a body, as many as --explained asks for)");
+    for (const auto& one : methods) one->declare(arguments);
     arguments.flag("--detach", detach, "Leave the job to itself: `shapectl watch JOB` follows it");
   }
 
   ExitCode run(const Session& session) const {
-    if (method != "shell-pga") throw InvalidInput("METHOD", "is \"" + method + "\", want shell-pga");
+    const auto& chosen = methodNamed(methods, method);
     const auto shapes = source();
+    v1::TrainRequest request;
+    request.set_model_name(name);
+    chosen.fill(shapes, countOf("--modes", modes), request);
     const auto channel = session.channel();
     const auto jobs = v1::Jobs::NewStub(channel);
     v1::Job job;
     {
       ProgressBar bar;
-      const auto dataset = upload(channel, shapes, session, bar);
-      job = start(*jobs, dataset, session);
+      request.set_dataset(upload(channel, shapes, session, bar).name());
+      job = start(*jobs, request, session);
       if (!detach) job = follow(*jobs, job, session, bar);
     }
     return detach ? printStarted(job, session) : printEnded(job, session);
@@ -61,17 +62,7 @@ struct Train {
                                  [&](std::int64_t sent) { bar.show(static_cast<double>(sent) / count, "uploading"); });
   }
 
-  v1::Job start(v1::Jobs::Stub& jobs, const v1::Dataset& dataset, const Session& session) const {
-    v1::TrainRequest request;
-    request.set_model_name(name);
-    request.set_dataset(dataset.name());
-    request.set_publish_unconverged(publish_unconverged);
-    auto& options = *request.mutable_shell_pga();
-    options.set_modes(countOf("--modes", modes));
-    options.set_path_steps(countOf("--path-steps", path_steps));
-    options.set_coarse_vertices(countOf("--coarse-vertices", coarse_vertices));
-    options.set_bending(bending);
-    if (directed) options.set_path_energy(v1::PATH_ENERGY_DIRECTED);
+  static v1::Job start(v1::Jobs::Stub& jobs, const v1::TrainRequest& request, const Session& session) {
     client::Call call(session.callOptions());
     v1::TrainResponse response;
     client::require(jobs.Train(call.context(), request, &response));

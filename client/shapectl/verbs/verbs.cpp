@@ -11,7 +11,7 @@ std::vector<Verb> allVerbs() {
       jobsVerb(),     watchVerb(),      resultVerb(),      cancelVerb(),       deleteJobVerb(),  //
       projectVerb(),  synthesizeVerb(), interpolateVerb(), editVerb(),                           //
       smoothVerb(),   geodesicVerb(),   bezierVerb(),      joinVerb(),                           //
-      fitVerb(),      scoreVerb(),      evaluateVerb(),                                          //
+      fitVerb(),      registerVerb(),   scoreVerb(),       evaluateVerb(),                       //
       sampleVerb(),   sampleScanVerb(), renderVerb(),      renderMotionVerb(),                   //
       tokenVerb(),    topVerb(),        healthVerb(),      benchVerb(),                          //
   };

@@ -31,6 +31,7 @@ Verb bezierVerb();
 Verb joinVerb();
 Verb renderMotionVerb();
 Verb fitVerb();
+Verb registerVerb();
 Verb scoreVerb();
 Verb evaluateVerb();
 Verb sampleVerb();

@@ -8,8 +8,12 @@
 #include "core/io/file.h"
 #include "core/io/file_error.h"
 #include "core/io/sha256.h"
+#include "core/model/body_shapes.h"
+#include "core/model/shell_pga_shapes.h"
 #include "server/convert/model.h"
 #include "server/errors/errors.h"
+#include "server/models/kind.h"
+#include "tests/support/bodies.h"
 #include "tests/support/models.h"
 #include "tests/support/temporary_folder.h"
 
@@ -32,10 +36,22 @@ ServedModelPtr pinNow(ModelStore& store, const ModelSelector& selector) {
     }
 }
 
+const ShapeModelPtr& tubes() {
+  static const ShapeModelPtr model = std::make_shared<const ShellPgaShapes>(test::tubeModel());
+  return model;
+}
+
+/// A body model of bars with two joints more than its root.
+ShapeModelPtr bars() {
+  return std::make_shared<const BodyShapes>(
+      test::tubeModel(3, 6, 3),
+      BodyTrainingRecord{6, PostureNormalisation::kLocal, 0.1, Eigen::VectorXd::LinSpaced(5, 0.5, 0.1), 2.5});
+}
+
 /// A folder with this many versions of "m".
 void publishVersions(const std::filesystem::path& folder, int count) {
   ModelStore store(folder);
-  for (int i = 0; i < count; ++i) store.publish("m", test::tubeModel(), provenance);
+  for (int i = 0; i < count; ++i) store.publish("m", tubes(), provenance);
 }
 
 }  // namespace
@@ -44,15 +60,15 @@ TEST_CASE("a published model is served at once, and by the next daemon") {
   const test::TemporaryFolder folder;
   {
     ModelStore store(folder.path());
-    CHECK(store.publish("m", test::tubeModel(), provenance)->version == 1);
-    CHECK(store.publish("m", test::tubeModel(), provenance)->version == 2);
+    CHECK(store.publish("m", tubes(), provenance)->version == 1);
+    CHECK(store.publish("m", tubes(), provenance)->version == 2);
     CHECK(store.pin({"m", 0, ""})->version == 2);
-    CHECK(store.pin({"m", 0, ""})->shell_pga == test::tubeModel());  // still in memory
+    CHECK(store.pin({"m", 0, ""})->shapes == tubes());  // still in memory
   }
   ModelStore store(folder.path());
   const auto model = pinNow(store, {"m", 1, ""});
-  CHECK(model->shell_pga->topology().id() == test::tubeModel()->topology().id());
-  CHECK((model->shell_pga->mean() - test::tubeModel()->mean()).cwiseAbs().maxCoeff() < 1e-12);
+  CHECK(model->shapes->topology().id() == test::tubeModel()->topology().id());
+  CHECK((model->shapes->mean() - test::tubeModel()->mean()).cwiseAbs().maxCoeff() < 1e-12);
   CHECK(provenanceOf(model->manifest).dataset == "tubes");
   CHECK(provenanceOf(model->manifest).created == provenance.created);
   CHECK(pinNow(store, {"m", 1, ""}) == model);
@@ -61,10 +77,10 @@ TEST_CASE("a published model is served at once, and by the next daemon") {
 TEST_CASE("a version tells the job that made it") {
   const test::TemporaryFolder folder;
   ModelStore store(folder.path());
-  store.publish("m", test::tubeModel(), provenance);
+  store.publish("m", tubes(), provenance);
   CHECK(store.publishedBy("m", "abc") == 0);
   CHECK(store.publishedBy("nobody", "abc") == 0);
-  store.publish("m", test::tubeModel(), {"tubes", provenance.created, "7", "abc"});
+  store.publish("m", tubes(), {"tubes", provenance.created, "7", "abc"});
   CHECK(store.publishedBy("m", "abc") == 2);
   CHECK(store.publishedBy("m", "abd") == 0);
   CHECK(provenanceOf(pinNow(store, {"m", 2, ""})->manifest).job == "7");
@@ -87,7 +103,7 @@ TEST_CASE("what is not there is not found") {
   const test::TemporaryFolder folder;
   ModelStore store(folder.path());
   CHECK_THROWS_AS(pinNow(store, {"m", 0, ""}), ModelNotFound);
-  store.publish("m", test::tubeModel(), provenance);
+  store.publish("m", tubes(), provenance);
   CHECK_THROWS_AS(pinNow(store, {"m", 2, ""}), ModelNotFound);
   CHECK_THROWS_AS(store.remove("m", 2), ModelNotFound);
   CHECK_THROWS_AS(store.remove("n", 0), ModelNotFound);
@@ -97,18 +113,18 @@ TEST_CASE("what is not there is not found") {
 TEST_CASE("a pinned model outlives its removal") {
   const test::TemporaryFolder folder;
   ModelStore store(folder.path());
-  store.publish("m", test::tubeModel(), provenance);
-  store.publish("m", test::tubeModel(), provenance);
+  store.publish("m", tubes(), provenance);
+  store.publish("m", tubes(), provenance);
   const auto pinned = pinNow(store, {"m", 1, ""});
   CHECK(store.remove("m", 0) == std::vector<std::uint64_t>{1, 2});
-  CHECK(pinned->shell_pga->modes() == 2);
+  CHECK(pinned->shapes->modes() == 2);
   CHECK_THROWS_AS(pinNow(store, {"m", 1, ""}), ModelNotFound);
   CHECK(store.list().empty());
 }
 
 TEST_CASE("many who want one model wait for one load") {
   const test::TemporaryFolder folder;
-  ModelStore(folder.path()).publish("m", test::tubeModel(), provenance);
+  ModelStore(folder.path()).publish("m", tubes(), provenance);
   ModelStore store(folder.path());
   std::vector<ServedModelPtr> pinned(8);
   {
@@ -122,8 +138,8 @@ TEST_CASE("a damaged model is reported by name, and the list leaves a damaged ma
   const test::TemporaryFolder folder;
   {
     ModelStore store(folder.path());
-    store.publish("m", test::tubeModel(), provenance);
-    store.publish("n", test::tubeModel(), provenance);
+    store.publish("m", tubes(), provenance);
+    store.publish("n", tubes(), provenance);
   }
   std::ofstream(folder.path() / "m/1/tensors.safetensors", std::ios::app) << "x";
   std::ofstream(folder.path() / "n/1/manifest.json") << "{";
@@ -135,16 +151,17 @@ TEST_CASE("a damaged model is reported by name, and the list leaves a damaged ma
 
 TEST_CASE("a manifest with fields of other types is listed with what it does say") {
   ModelStore::Entry entry{"m", 1, {}, ModelState::kStored, 0, {}};
-  entry.manifest.kind = "other";
+  entry.manifest.kind = GENERATE("shell_pga", "body", "other");
   entry.manifest.description = {{"vertices", "many"}, {"faces", 80},
                                 {"modes", -1},        {"bending", nlohmann::json::array()},
                                 {"topology", 7},      {"provenance", {{"dataset", 3}, {"created", 9e18}}}};
   v1::ModelDescription description;
   toProto(entry, description);
-  CHECK(description.kind() == "other");
+  CHECK(description.kind() == entry.manifest.kind);
   CHECK(description.vertex_count() == 0);
   CHECK(description.face_count() == 80);
   CHECK(description.shell_pga().modes() == 0);
+  CHECK(description.body().modes() == 0);
   CHECK(description.topology_id().empty());
   CHECK(description.dataset().empty());
   CHECK_FALSE(description.has_created());
@@ -153,7 +170,7 @@ TEST_CASE("a manifest with fields of other types is listed with what it does say
 TEST_CASE("list and description agree") {
   const test::TemporaryFolder folder;
   ModelStore store(folder.path());
-  const auto model = store.publish("m", test::tubeModel(), provenance);
+  const auto model = store.publish("m", tubes(), provenance);
   v1::ModelDescription listed, described;
   toProto(store.list().front(), listed);
   toProto(*model, described);
@@ -164,6 +181,36 @@ TEST_CASE("list and description agree") {
   described.clear_training();
   listed.clear_training();
   CHECK(listed.SerializeAsString() == described.SerializeAsString());
+}
+
+TEST_CASE("a model of another kind is published, listed, described, dropped and loaded like any other") {
+  const test::TemporaryFolder folder;
+  ModelStore store(folder.path());
+  const auto model = store.publish("b", bars(), provenance);
+  store.publish("m", tubes(), provenance);
+  v1::ModelDescription listed, described;
+  toProto(store.list().front(), listed);
+  toProto(*model, described);
+  for (const auto& description : {listed, described}) {
+    CHECK(description.kind() == "body");
+    CHECK_FALSE(description.has_shell_pga());
+    CHECK(description.body().modes() == 3);
+    CHECK(description.body().training_shapes() == 6);
+    CHECK(description.vertex_count() == static_cast<std::uint32_t>(model->shapes->topology().vertexCount()));
+    CHECK(description.topology_id() == model->shapes->topology().id());
+    CHECK(description.memory_bytes() == model->bytes);
+  }
+  CHECK(described.body().posture() == v1::POSTURE_NORMALISATION_LOCAL);
+  CHECK(described.body().variances_size() == 5);
+  REQUIRE(described.body().joints_size() > 2);
+  CHECK(described.body().joints(0).parent() == -1);
+  CHECK(described.training().seconds() == 2.5);
+  CHECK(bodyFor("a test", *model).modes() == 3);
+  CHECK_THROWS_WITH(shellPgaFor("Shapes.Edit", *model),
+                    "model b version 1 is of kind \"body\", and Shapes.Edit needs one of kind \"shell_pga\"");
+  CHECK_THROWS_AS(bodyFor("a test", *store.pin({"m", 0, ""})), WrongState);
+  CHECK(store.unload("b", 0) == std::vector<std::uint64_t>{1});
+  CHECK(pinNow(store, {"b", 0, ""})->shapes->mean() == model->shapes->mean());
 }
 
 TEST_CASE("a model that is not in memory is waited for without a thread") {
@@ -207,7 +254,7 @@ TEST_CASE("what another process puts into the store counts once it is loaded") {
   CHECK(store.pin({"m", 0, ""}) == before);
   CHECK(store.load("m", 0)->wait()->version == 2);
   CHECK(store.pin({"m", 0, ""})->version == 2);
-  CHECK(before->shell_pga->modes() == 2);            // who holds it keeps it
+  CHECK(before->shapes->modes() == 2);               // who holds it keeps it
   CHECK(store.loaded().size() == 1);                 // the store does not
   CHECK(pinNow(store, {"m", 1, ""})->version == 1);  // by number it can still be had
   CHECK(store.pin({"m", 0, ""})->version == 2);
@@ -263,7 +310,7 @@ TEST_CASE("the memory budget drops what was used longest ago, and never what a r
   const test::TemporaryFolder folder;
   const auto bytes = test::tubeModel()->bytes();
   ModelStore store(folder.path(), {.memory_budget = 2 * bytes + bytes / 2, .loaders = 1});
-  for (const auto* name : {"a", "b", "c"}) store.publish(name, test::tubeModel(), provenance);
+  for (const auto* name : {"a", "b", "c"}) store.publish(name, tubes(), provenance);
   REQUIRE(store.loaded().size() == 2);
   CHECK(store.loaded()[0]->name == "b");
   const auto held = store.pin({"b", 0, ""});
@@ -276,7 +323,7 @@ TEST_CASE("the memory budget drops what was used longest ago, and never what a r
 TEST_CASE("a model larger than the whole budget is published, but not served") {
   const test::TemporaryFolder folder;
   ModelStore store(folder.path(), {.memory_budget = 1000, .loaders = 1});
-  CHECK(store.publish("m", test::tubeModel(), provenance)->version == 1);
+  CHECK(store.publish("m", tubes(), provenance)->version == 1);
   CHECK(store.loaded().empty());
   try {
     pinNow(store, {"m", 0, ""});
@@ -309,7 +356,7 @@ TEST_CASE("one can wait for a model that is still to come") {
     waiting.then([&] { ++woken; });
   }
   CHECK(woken == 0);
-  store.publish("m", test::tubeModel(), provenance);
+  store.publish("m", tubes(), provenance);
   CHECK(woken == 1);
   CHECK(store.ready({"m", 0, ""})->version == 1);
 }

@@ -1,0 +1,47 @@
+#include "client/shapectl/scan_landmarks.h"
+
+#include <limits>
+
+#include "core/io/file.h"
+#include "core/io/json_fields.h"
+#include "core/numerics/error.h"
+
+namespace shaped::shapectl {
+namespace {
+
+std::uint32_t indexIn(const nlohmann::json& entry, const char* field) {
+  return static_cast<std::uint32_t>(requireWholeNumber(entry, field, 0, std::numeric_limits<std::int32_t>::max()));
+}
+
+v1::ScanLandmark landmarkFrom(const nlohmann::json& entry) {
+  v1::ScanLandmark landmark;
+  if (entry.contains("vertex") == entry.contains("face")) throw InvalidInput("place", "want either vertex or face");
+  if (entry.contains("vertex")) {
+    landmark.set_vertex(indexIn(entry, "vertex"));
+  } else {
+    landmark.mutable_point()->set_face(indexIn(entry, "face"));
+    for (const auto& weight : entry.at("barycentric")) landmark.mutable_point()->add_barycentric(weight.get<double>());
+  }
+  for (const auto& coordinate : entry.at("position")) landmark.add_position(coordinate.get<double>());
+  if (landmark.position_size() != 3) throw InvalidInput("position", "want three numbers");
+  if (entry.contains("weight")) landmark.set_weight(entry.at("weight").get<double>());
+  return landmark;
+}
+
+}  // namespace
+
+std::vector<v1::ScanLandmark> readScanLandmarks(const std::filesystem::path& path) {
+  const auto document = parseJson(path.string(), readFile(path));
+  std::vector<v1::ScanLandmark> landmarks;
+  try {
+    for (const auto& entry : document.at("landmarks")) landmarks.push_back(landmarkFrom(entry));
+  } catch (const std::exception& error) {
+    throw InvalidInput(path.string(), "landmarks[" + std::to_string(landmarks.size()) +
+                                          "]: want {\"vertex\": i or \"face\": f, \"barycentric\": [3 weights], "
+                                          "\"position\": [3 numbers]}: " +
+                                          error.what());
+  }
+  return landmarks;
+}
+
+}  // namespace shaped::shapectl

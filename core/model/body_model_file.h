@@ -1,0 +1,48 @@
+#pragma once
+
+#include "core/body/body_training.h"
+#include "core/io/model_directory.h"
+
+namespace shaped {
+
+/// The kind of a body model's manifest.
+inline constexpr const char* kBodyKind = "body";
+
+/// How a body model was trained.
+struct BodyTrainingRecord {
+  int registrations = 0;  ///< n
+  PostureNormalisation posture = PostureNormalisation::kSkeleton;
+  double reach = 0.1;         ///< of PostureNormalisation::kLocal [m]
+  Eigen::VectorXd variances;  ///< of all modes of the training set, falling; those that were kept come first [m^2]
+  double seconds = 0;         ///< set by whoever measured; 0 where nobody did
+};
+
+/// What a body's file holds.
+struct StoredBody {
+  BodyModel model;
+  BodyTrainingRecord training;
+};
+
+/// "none", "skeleton", "local".
+std::string name(PostureNormalisation posture);
+/// Throws InvalidInput naming `field` for another text.
+PostureNormalisation postureNamed(const std::string& text, const std::string& field);
+
+/// Publishes a model as a new version and returns its number. provenance: as publishShellPga. Throws as
+/// ModelDirectory::publish.
+std::int64_t publishBody(const ModelDirectory& directory, const std::string& name, const BodyModel& model,
+                         const BodyTrainingRecord& training,
+                         const nlohmann::json& provenance = nlohmann::json::object());
+
+/// Throws InvalidInput naming "manifest" when the kind or format version is none that bodyFrom() reads.
+void requireBody(const ModelManifest& manifest);
+
+/// Builds the model out of its files. Throws InvalidInput when kind or format version is another, the description or a
+/// tensor is missing or of another type or shape, or BodyModel refuses what they hold; also when the mean is no valid
+/// shape, the modes are not orthonormal, or deviations and variances do not fall.
+StoredBody bodyFrom(const ModelManifest& manifest, const TensorFile& tensors);
+
+/// Builds the model that a stored version holds. Throws FileError naming the version where bodyFrom() throws.
+StoredBody loadBody(const StoredModel& stored);
+
+}  // namespace shaped
