@@ -34,17 +34,17 @@ std::optional<ClothingPairs::Pair> ClothingPairs::pairOf(const Vertices& surface
 
 std::vector<SurfaceTarget> ClothingPairs::find(const Vertices& surface, const ClothingWeights& weights) const {
   const Vertices normals = vertexNormals(model_.topology()->faces(), surface);
-  const RobustLoss loss{RobustLoss::Kind::kGemanMcClure, options_.loss_scale};
+  const RobustLoss inside{RobustLoss::Kind::kGemanMcClure, options_.loss_scale};
+  const RobustLoss outside{RobustLoss::Kind::kGemanMcClure, options_.outside_scale};
   std::vector<SurfaceTarget> targets;
   for (const std::int32_t v : chosen_) {
     const auto pair = pairOf(surface, normals, v);
     if (!pair) continue;
-    const double data = weights.data * loss.weight(pair->height * pair->height);
-    targets.push_back({{v, v, v},
-                       Eigen::Vector3d::UnitX(),
-                       pair->position.transpose(),
-                       pair->normal.transpose(),
-                       data + (pair->height > 0 ? weights.cloth : 0)});
+    const double square = pair->height * pair->height;
+    const double weight = pair->height > 0 ? (weights.data + weights.cloth) * outside.weight(square)
+                                           : weights.data * inside.weight(square);
+    targets.push_back(
+        {{v, v, v}, Eigen::Vector3d::UnitX(), pair->position.transpose(), pair->normal.transpose(), weight});
   }
   const auto pulls =
       landmarkTargets(landmarks_, model_.topology()->faces(), weights.landmarks * double(targets.size()));

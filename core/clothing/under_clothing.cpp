@@ -58,7 +58,7 @@ class Sequence {
     for (int round = 0; round < options_.rounds; ++round) {
       std::vector<std::vector<SurfaceTarget>> targets;
       for (std::size_t i = 0; i < frames.size(); ++i) targets.push_back(frames_[frames[i]].find(surfaces[i], weights));
-      const auto step = fitBodies(model_, result.solution, targets, fitOptions(identity, pose));
+      const auto step = fitBodies(model_, result.solution, targets, fitOptions(targets, identity, pose));
       result.iterations += step.iterations;
       if (step.termination == Termination::kCancelled || step.termination == Termination::kNumericalFailure) {
         result.termination = step.termination;
@@ -84,8 +84,13 @@ class Sequence {
     return surfaces;
   }
 
-  BodyFitOptions fitOptions(bool identity, bool pose) const {
+  BodyFitOptions fitOptions(const std::vector<std::vector<SurfaceTarget>>& targets, bool identity, bool pose) const {
     BodyFitOptions fit;
+    // Weights are absolute here: what the cloth's term adds must not take from the data's.
+    double weights = 0, count = 0;
+    for (const auto& frame : targets)
+      for (const auto& target : frame) weights += target.weight, count += 1;
+    if (weights > 0) fit.observations *= weights / count;
     fit.sigma = 0.01;
     fit.pose_deviation = 0.5;
     fit.identity = identity;
@@ -215,12 +220,16 @@ class FirstFits {
 };
 
 /// The frames that fit well, best first: a missed posture must not speak of the identity.
-std::vector<std::size_t> goodFrames(const std::vector<FirstFit>& fits, double good_share) {
+std::vector<std::size_t> goodFrames(const std::vector<FirstFit>& fits, std::span<const std::vector<Landmark>> landmarks,
+                                    double good_share) {
   std::vector<std::size_t> order(fits.size());
   std::iota(order.begin(), order.end(), std::size_t(0));
   std::stable_sort(order.begin(), order.end(),
                    [&](std::size_t a, std::size_t b) { return fits[a].score > fits[b].score; });
-  std::erase_if(order, [&, best = fits[order[0]].score](std::size_t f) { return fits[f].score < good_share * best; });
+  std::erase_if(order, [&, best = fits[order[0]].score](std::size_t f) {
+    const bool shown = !landmarks.empty() && landmarks[f].size() >= 3;  // the posture is known
+    return !shown && fits[f].score < good_share * best;
+  });
   return order;
 }
 
@@ -246,6 +255,7 @@ std::optional<std::string> ClothingOptions::firstViolation() const {
     for (const double weight : {weights.landmarks, weights.data, weights.cloth})
       if (!(weight >= 0) || !std::isfinite(weight)) return std::string(name) + " holds a weight below 0";
   if (auto problem = positive("loss_scale", loss_scale)) return problem;
+  if (auto problem = positive("outside_scale", outside_scale)) return problem;
   if (auto problem = positive("max_distance", max_distance)) return problem;
   if (auto problem = positive("tolerance", tolerance)) return problem;
   if (!(max_normal_angle > 0 && max_normal_angle <= 180))
@@ -270,7 +280,7 @@ Solved<ClothedBody> estimateUnderClothing(std::span<const Scan> scans, const Bod
   }
   BodySequence state{fits[first_fits.best()].state.identity, {}};
   for (const auto& fit : fits) state.poses.push_back(fit.state.pose);
-  const auto trusted = goodFrames(fits, options.good_share);
+  const auto trusted = goodFrames(fits, landmarks, options.good_share);
   const std::size_t together = std::min(trusted.size(), std::size_t(options.first_frames));
   sequence.settle(state, {trusted.begin(), trusted.begin() + std::ptrdiff_t(together)}, options.first, true);
   std::vector<Outcome> outcomes(sequence.size());

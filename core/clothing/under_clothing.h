@@ -28,15 +28,16 @@ struct ClothingOptions {
   int retries = 3;            ///< poses of other frames that are tried, >= 0
   int first_frames = 3;       ///< that the first identity is solved on, >= 1
   ClothingWeights first = {1, 1, 1};        ///< identity and posture of the first frames
-  ClothingWeights postures = {0.5, 1, 20};  ///< posture after posture, the identity held
-  ClothingWeights refined = {0, 1, 1000};   ///< identity of all frames, the postures held
-  double loss_scale = 0.03;                 ///< of the data term's robust loss, m, > 0
-  double max_distance = 0.15;               ///< gate, m, > 0
-  double max_normal_angle = 75;             ///< gate, degrees, (0, 180]
-  int points = 4000;                        ///< of the model that take part, >= 50
-  int rounds = 12;                          ///< closest points are renewed at most so often in a step, >= 1
-  int passes = 2;                           ///< postures and identity in turn, >= 1
-  double tolerance = 2e-4;                  ///< of a round: root mean square motion of the surface, m, > 0
+  ClothingWeights postures = {0.5, 1, 10};  ///< posture after posture, the identity held
+  ClothingWeights refined = {0, 1, 30};     ///< identity of all frames, the postures held
+  double loss_scale = 0.15;                 ///< of the robust loss of points inside: cloth hangs loose, m, > 0
+  double outside_scale = 0.03;   ///< of points outside: what stands far out is a missed limb or a stray point, m, > 0
+  double max_distance = 0.15;    ///< gate, m, > 0
+  double max_normal_angle = 75;  ///< gate, degrees, (0, 180]
+  int points = 4000;             ///< of the model that take part, >= 50
+  int rounds = 12;               ///< closest points are renewed at most so often in a step, >= 1
+  int passes = 2;                ///< postures and identity in turn, >= 1
+  double tolerance = 2e-4;       ///< of a round: root mean square motion of the surface, m, > 0
   ScanRegistrationOptions registration = clothedRegistration();  ///< of first fits
   std::stop_token stop = {};
   ProgressSink progress = {};
