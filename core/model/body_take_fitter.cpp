@@ -144,13 +144,12 @@ Eigen::VectorXd BodyTakeFitter::distances(const MarkerPositions& markers, const 
   return result;
 }
 
-/// While a body has yet to follow its markers they are outliers at three times their median distance, then at the
-/// robust scale.
-Eigen::VectorXd BodyTakeFitter::weights(const Eigen::VectorXd& distances) const {
+/// At least at three times their median distance are markers outliers: the body may have yet to follow them.
+Eigen::VectorXd BodyTakeFitter::weights(const Eigen::VectorXd& distances, double least_scale) const {
   std::vector<double> present;
   for (const double distance : distances)
     if (std::isfinite(distance)) present.push_back(distance);
-  const double scale = std::max(options_.robust_scale * size_, 3 * median(present));
+  const double scale = std::max(least_scale, 3 * median(present));
   return distances.unaryExpr([&](double distance) {
     if (!std::isfinite(distance)) return 0.0;
     if (options_.robust_scale == 0 || scale == 0) return 1.0;
@@ -159,8 +158,11 @@ Eigen::VectorXd BodyTakeFitter::weights(const Eigen::VectorXd& distances) const 
   });
 }
 
-Solved<BodyState> BodyTakeFitter::fitFrom(BodyState body, const MarkerPositions& markers, bool identity,
-                                          int rounds) const {
+/// scale: of the robust loss to begin with, halved from round to round down to the one that is asked for.
+Solved<BodyState> BodyTakeFitter::fitFrom(BodyState body, const MarkerPositions& markers, bool identity, int rounds,
+                                          double scale) const {
+  const double last_scale = options_.robust_scale * size_;
+  if (last_scale == 0) scale = 0;
   BodyFitOptions fitting;
   fitting.sigma = kMarkerNoise;
   fitting.prior = options_.prior_weight;
@@ -169,7 +171,8 @@ Solved<BodyState> BodyTakeFitter::fitFrom(BodyState body, const MarkerPositions&
   Outcome outcome;
   for (int round = 0; round < rounds && !options_.stop.stop_requested(); ++round) {
     const auto places = placesOn(body);
-    const auto weight = weights(distances(markers, body));
+    scale = std::max(scale, last_scale);
+    const auto weight = weights(distances(markers, body), scale);
     std::vector<SurfaceTarget> targets;
     for (Eigen::Index l = 0; l < markers.rows(); ++l) {
       const auto& site = sites_[static_cast<std::size_t>(l)];
@@ -183,7 +186,9 @@ Solved<BodyState> BodyTakeFitter::fitFrom(BodyState body, const MarkerPositions&
     outcome = solved;
     outcome.iterations = iterations;
     body = std::move(solved.solution);
-    if ((placesOn(body).markers - places.markers).rowwise().norm().maxCoeff() < kStillness) break;
+    const double motion = (placesOn(body).markers - places.markers).rowwise().norm().maxCoeff();
+    if (scale <= last_scale && motion < kStillness) break;
+    scale /= 2;
   }
   if (options_.stop.stop_requested()) outcome.termination = Termination::kCancelled;
   return {std::move(body), outcome};
@@ -197,7 +202,7 @@ Outcome BodyTakeFitter::calibrate(const std::vector<MarkerPositions>& frames) {
     const std::string field = "calibration[" + std::to_string(i) + "]";
     if (!placeable(frames[i], field))
       throw InvalidInput(field, "shows fewer than three markers, or only markers on one line");
-    const auto solved = fitFrom(rigidStart(frames[i]), frames[i], true, kFirstRounds);
+    const auto solved = fitFrom(rigidStart(frames[i]), frames[i], true, kFirstRounds, size_);
     outcome += solved;
     if (outcome.termination == Termination::kCancelled) return outcome;
     const double rms = std::max(rmsOf(distances(frames[i], solved.solution)), 1e-3);
@@ -217,8 +222,8 @@ Solved<TakeFrame> BodyTakeFitter::fit(const MarkerPositions& markers) {
     throw InvalidInput("markers", "the first frame shows fewer than three markers, or only markers on one line");
   Outcome outcome{Termination::kConverged, 0, 0};
   if (enough) {
-    const auto solved = state_.started ? fitFrom(state_.body, markers, false, kNextRounds)
-                                       : fitFrom(rigidStart(markers), markers, !state_.known, kFirstRounds);
+    const auto solved = state_.started ? fitFrom(state_.body, markers, false, kNextRounds, 0)
+                                       : fitFrom(rigidStart(markers), markers, !state_.known, kFirstRounds, size_);
     outcome = solved;
     state_ = {true, true, solved.solution};
   }

@@ -11,6 +11,8 @@ namespace shaped {
 
 /// Fits a take of markers with a body model: a few steps of iteratively reweighted least squares a frame (the robust
 /// loss of Geman and McClure), each by fitBody, with the markers' offsets turned as the skin under them stands. The
+/// first frame begins with a loss as wide as the body, which then narrows (graduated non-convexity, Blake and Zisserman
+/// 1987): at rest, limbs are far from their markers. The
 /// subject stays the same person: the identity is what the calibration frames say in the mean, or the first frame, and
 /// then only the pose changes. Bodies have their size in their identity, so that there is no scale.
 class BodyTakeFitter final : public TakeFitter {
@@ -46,8 +48,9 @@ class BodyTakeFitter final : public TakeFitter {
   Places placesOn(const BodyState& body) const;
   BodyState rigidStart(const MarkerPositions& markers) const;
   Eigen::VectorXd distances(const MarkerPositions& markers, const BodyState& body) const;
-  Eigen::VectorXd weights(const Eigen::VectorXd& distances) const;
-  Solved<BodyState> fitFrom(BodyState start, const MarkerPositions& markers, bool identity, int rounds) const;
+  Eigen::VectorXd weights(const Eigen::VectorXd& distances, double least_scale) const;
+  Solved<BodyState> fitFrom(BodyState start, const MarkerPositions& markers, bool identity, int rounds,
+                            double scale) const;
 
   const std::shared_ptr<const BodyModel> whole_;
   const BodyModel model_;  ///< of the modes that are used

@@ -56,7 +56,8 @@ def bend(positions):
 def main(address, name, ca=None, token_file=None):
     channel = connect(address, ca, token_file and pathlib.Path(token_file).read_text().strip())
     for model in unary(channel, "Models", "List", models_pb2.ListModelsRequest(), models_pb2.ListModelsResponse).models:
-        print(f"{model.model.name}@{model.model.version}: {model.vertex_count} vertices, {model.shell_pga.modes} modes")
+        modes = getattr(model, model.kind).modes  # "shell_pga" or "body"
+        print(f"{model.model.name}@{model.model.version}: {model.vertex_count} vertices, {modes} modes")
 
     wanted = models_pb2.GetModelRequest(with_mean=True)
     wanted.model.name = name

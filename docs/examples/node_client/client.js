@@ -17,8 +17,8 @@ function bend(positions) {
 
 async function main([address, name, ca, tokenFile]) {
   const daemon = connect(address, {ca, token: tokenFile && fs.readFileSync(tokenFile, 'utf8').trim()});
-  for (const {model, vertex_count: vertices, shell_pga: pga} of (await unary(daemon.models, 'List', {})).models)
-    console.log(`${model.name}@${model.version}: ${vertices} vertices, ${pga.modes} modes`);
+  for (const {model, vertex_count: vertices, shell_pga: pga, body} of (await unary(daemon.models, 'List', {})).models)
+    console.log(`${model.name}@${model.version}: ${vertices} vertices, ${(body || pga).modes} modes`);
 
   const model = {name};
   const {description, mean} = await unary(daemon.models, 'Get', {model, with_mean: true});
