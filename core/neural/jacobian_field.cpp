@@ -18,6 +18,9 @@ void requireInputs(const PointNet& net, Eigen::Index inputs) {
 
 void requireFit(const JacobianFieldFeatures& features) {
   const auto faces = features.current.rows();
+  if (features.offsets.cols() != kOffsetInputs)
+    throw InvalidInput("features", "have offsets of " + countOf(features.offsets.cols(), "numbers, want ") +
+                                       std::to_string(kOffsetInputs));
   if (features.triangles.rows() != faces || std::ssize(features.nearest) != faces || features.offsets.rows() != faces)
     throw InvalidInput("features", "have " + countOf(features.triangles.rows(), "triangles, ") +
                                        countOf(std::ssize(features.nearest), "nearest points and ") +
@@ -37,7 +40,8 @@ Linear withSharedInputs(const Linear& layer, const Eigen::VectorXf& shared) {
 }  // namespace
 
 Eigen::Index JacobianFieldWeights::localInputs() const {
-  return kTriangleInputs + 9 + source_net.back().weight.rows() + scan_net.back().weight.rows() + (offsets ? 3 : 0);
+  return kTriangleInputs + 9 + source_net.back().weight.rows() + scan_net.back().weight.rows() +
+         (offsets ? kOffsetInputs : 0);
 }
 
 JacobianField::JacobianField(JacobianFieldWeights weights)
@@ -59,7 +63,7 @@ Jacobians JacobianField::predict(const JacobianFieldFeatures& features) const {
   const auto source = source_net_(features.triangles), scan = scan_net_(features.scan);
   Eigen::MatrixXf items(features.current.rows(), weights_.localInputs());
   items << features.triangles, features.current.cast<float>(), source.each, scan.each(features.nearest, Eigen::all),
-      features.offsets.leftCols(weights_.offsets ? 3 : 0);
+      features.offsets.leftCols(weights_.offsets ? kOffsetInputs : 0);
   Eigen::VectorXf whole(source.whole.size() + scan.whole.size());
   whole << source.whole.transpose(), scan.whole.transpose();
   auto layers = weights_.mlp;

@@ -70,12 +70,14 @@ Eigen::MatrixXf scanInputs(const Scan& scan, const FieldScaling& scaling) {
 void lookUpNearest(const Scan& scan, const Vertices& centroids, double unit, JacobianFieldFeatures& features) {
   const PointTree tree(scan.points);
   features.nearest.resize(static_cast<std::size_t>(centroids.rows()));
-  features.offsets.resize(centroids.rows(), 3);
+  features.offsets = Eigen::MatrixXf::Zero(centroids.rows(), kOffsetInputs);
   for (Eigen::Index f = 0; f < centroids.rows(); ++f) {
     const auto point = tree.nearest(centroids.row(f)).index;
     features.nearest[static_cast<std::size_t>(f)] = point;
     const Eigen::RowVector3d offset = (scan.points.row(point) - centroids.row(f)) / unit;
-    features.offsets.row(f) = (offset * std::min(1.0, kLargestOffset / offset.norm())).cast<float>();
+    features.offsets.row(f).head<3>() = (offset * std::min(1.0, kLargestOffset / offset.norm())).cast<float>();
+    if (scan.normals.rows() == 0) continue;
+    features.offsets.row(f).tail<3>() = features.scan.row(point).tail<3>() - features.triangles.row(f).segment<3>(3);
   }
 }
 

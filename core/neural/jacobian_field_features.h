@@ -17,6 +17,8 @@ constexpr int kFieldSignatures = 50;
 constexpr int kTriangleInputs = 6 + kFieldSignatures;
 /// What its second PointNet sees of a scan's point: position, normal.
 constexpr int kScanInputs = 6;
+/// Columns of JacobianFieldFeatures::offsets.
+constexpr int kOffsetInputs = 6;
 
 /// The shape that Jacobians of one topology's shapes are taken against: the mean of a model, or any template.
 struct FieldReference {
@@ -55,7 +57,9 @@ struct JacobianFieldFeatures {
   Vertices centroids;                 ///< C x 3: of the source's components [m]
   Eigen::MatrixXf scan;               ///< P x 6: the scan's points, scaled, and unit normals, 0 where unknown
   std::vector<std::int32_t> nearest;  ///< F: the scan's point nearest to each triangle's centroid
-  Eigen::MatrixXf offsets;            ///< F x 3: from centroid to that point, in hundredths of the extent, at most 10
+  /// F x 6: from the centroid to that point, in hundredths of the extent and cut at 10 of them, and from the triangle's
+  /// normal to the point's (0 where that is unknown).
+  Eigen::MatrixXf offsets;
 };
 
 /// source: V x 3 of the reference's topology, in the rest pose [m]. scan: its points, in the same pose and place: who
