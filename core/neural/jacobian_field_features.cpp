@@ -17,6 +17,8 @@ constexpr int kEigenfunctions = 100;
 constexpr double kOffsetUnit = 0.01;
 /// Of that unit: how far a scan's hole is from the source says nothing.
 constexpr double kLargestOffset = 10;
+/// In deviations. Fingertips reach 20, and would drown all else that a network sees.
+constexpr float kLargestSignature = 5;
 /// Of the mean: signatures that are the same all over say nothing, and must not be magnified.
 constexpr float kLeastDeviation = 1e-3F;
 
@@ -55,8 +57,9 @@ Eigen::MatrixXf trianglesOf(const FieldReference& reference, const Vertices& sou
   Eigen::MatrixXf inputs(faces.rows(), kTriangleInputs);
   inputs.leftCols<3>() = ((centroids.rowwise() - scaling.centre) / scaling.extent).cast<float>();
   inputs.middleCols<3>(3) = faceNormals(faces, source).cast<float>();
+  const Eigen::ArrayXXf centred = reference.signatures.rowwise() - scaling.signature_mean;
   inputs.rightCols<kFieldSignatures>() =
-      (reference.signatures.rowwise() - scaling.signature_mean).array().rowwise() / scaling.signature_deviation.array();
+      (centred.rowwise() / scaling.signature_deviation.array()).min(kLargestSignature).max(-kLargestSignature);
   return inputs;
 }
 

@@ -52,10 +52,10 @@ void requireScaling(const FieldScaling& scaling);
 
 /// What a field sees of a source shape and a scan [Muralikrishnan 2025, appendix B.4.1], before its networks.
 struct JacobianFieldFeatures {
-  Eigen::MatrixXf triangles;          ///< F x 56: the source's centroids and normals, signatures; scaled
-  Jacobians current;                  ///< F x 9: of the source, relative to the reference
-  Vertices centroids;                 ///< C x 3: of the source's components [m]
-  Eigen::MatrixXf scan;               ///< P x 6: the scan's points, scaled, and unit normals, 0 where unknown
+  Eigen::MatrixXf triangles;  ///< F x 56: the source's centroids and normals, signatures; scaled, those cut at 5
+  Jacobians current;          ///< F x 9: of the source, relative to the reference
+  Vertices centroids;         ///< C x 3: of the source's components [m]
+  Eigen::MatrixXf scan;       ///< P x 6: the scan's points, scaled, and unit normals, 0 where unknown
   std::vector<std::int32_t> nearest;  ///< F: the scan's point nearest to each triangle's centroid
   /// F x 6: from the centroid to that point, in hundredths of the extent and cut at 10 of them, and from the triangle's
   /// normal to the point's (0 where that is unknown).

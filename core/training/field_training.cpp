@@ -67,7 +67,8 @@ class FieldTrainer {
   double learningRate() const {
     const auto last = std::int64_t{options_.epochs} * stepsPerEpoch() - 1;
     const double passed = last > 0 ? static_cast<double>(state_.step) / static_cast<double>(last) : 0;
-    return options_.learning_rate * std::pow(options_.last_learning_rate / options_.learning_rate, passed);
+    const double rise = std::min(1.0, static_cast<double>(state_.step + 1) / (options_.warm_up + 1.0));
+    return rise * options_.learning_rate * std::pow(options_.last_learning_rate / options_.learning_rate, passed);
   }
 
   /// The pairs of the step that comes.
@@ -187,6 +188,7 @@ std::optional<std::string> FieldTrainingOptions::firstViolation() const {
   if (batch < 1) return "batch = " + std::to_string(batch) + ", want >= 1";
   if (!positive(learning_rate)) return "learning_rate = " + std::to_string(learning_rate) + ", want > 0";
   if (!positive(last_learning_rate)) return "last_learning_rate = " + std::to_string(last_learning_rate) + ", want > 0";
+  if (warm_up < 0) return "warm_up = " + std::to_string(warm_up) + ", want >= 0";
   if (!std::isfinite(vertex_weight) || vertex_weight < 0)
     return "vertex_weight = " + std::to_string(vertex_weight) + ", want >= 0";
   if (!std::isfinite(jacobian_weight) || jacobian_weight < 0)

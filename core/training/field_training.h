@@ -59,11 +59,14 @@ FieldTrainingState untrainedState(JacobianFieldWeights weights);
 struct FieldTrainingOptions {
   int epochs = 100;                  ///< >= 1
   int batch = 4;                     ///< pairs a step, >= 1; they are worked on in parallel
-  double learning_rate = 1e-3;       ///< of the first step, > 0
-  double last_learning_rate = 1e-5;  ///< of the last, > 0; between them it changes by the same factor every step
-  double vertex_weight = 10;         ///< [1/m^2], >= 0
-  double jacobian_weight = 1;        ///< >= 0; not both 0
-  std::uint64_t seed = 1;            ///< of the order of the pairs
+  double learning_rate = 1e-3;       ///< > 0
+  double last_learning_rate = 1e-5;  ///< of the last step, > 0; from step to step it changes by the same factor
+  /// Steps over which the rate rises to that, >= 0: Adam's first ones are as large as its later ones, and would throw a
+  /// field far from the identity that it starts from.
+  int warm_up = 100;
+  double vertex_weight = 10;   ///< [1/m^2], >= 0
+  double jacobian_weight = 1;  ///< >= 0; not both 0
+  std::uint64_t seed = 1;      ///< of the order of the pairs
   std::stop_token stop = {};
   /// Called after each epoch, and with the state then reached.
   std::function<void(const FieldEpoch&, const FieldTrainingState&)> each_epoch = {};

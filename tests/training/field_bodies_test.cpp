@@ -148,6 +148,9 @@ TEST_CASE("a field brings unseen bodies nearer to their scans than the linear mo
   options.learning_rate = setting("FIELD_RATE", 1e-3);
   options.last_learning_rate = setting("FIELD_LAST_RATE", 1e-4);
   options.vertex_weight = setting("FIELD_VERTEX_WEIGHT", 10);
+  for (int c : {0, 3, 6, 30, 55})
+    std::cout << "column " << c << " " << pairs[0].features.triangles.col(c).minCoeff() << " to "
+              << pairs[0].features.triangles.col(c).maxCoeff() << "\n";
   start = seconds();
   const double limit = setting("FIELD_SECONDS", 1e9);
   std::stop_source stop;
