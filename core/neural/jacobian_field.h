@@ -12,12 +12,13 @@ struct JacobianFieldWeights {
   FieldScaling scaling;
   std::vector<Linear> source_net;  ///< PointNet of the source's triangles: 56 inputs, s outputs
   std::vector<Linear> scan_net;    ///< PointNet of the scan's points: 6 inputs, p outputs
-  /// 65 + s + p + (6) + s + p inputs, 9 outputs. A triangle's inputs in order: its own 56; its current Jacobian (9);
-  /// its feature by source_net; the feature by scan_net of the scan's point nearest to its centroid; the offsets to
-  /// that point (6) if `offsets`; the features of the whole source and of the whole scan.
+  /// 65 + s + p + (15) + s + p inputs, 9 outputs. A triangle's inputs in order: its own 56; its current Jacobian (9);
+  /// its feature by source_net; the feature by scan_net of the scan's point nearest to its centroid; its offsets (15)
+  /// if `offsets`; the features of the whole source and of the whole scan.
   std::vector<Linear> mlp;
-  /// Our addition: how far the nearest point and its normal are off. The paper's features hold that only as a
-  /// difference of two numbers that agree to a hundredth.
+  /// Our addition: how far the scan is off, its normals and its Jacobians (JacobianFieldFeatures::offsets). The paper's
+  /// features hold the first two only as differences of numbers that agree to a hundredth, and the last not at all, as
+  /// no triangle sees its neighbours.
   bool offsets = false;
 
   /// Inputs that a triangle has of its own; those of the whole shape and scan come after.

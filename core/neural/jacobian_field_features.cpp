@@ -1,6 +1,7 @@
 #include "core/neural/jacobian_field_features.h"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <string>
 
@@ -17,6 +18,10 @@ constexpr int kEigenfunctions = 100;
 constexpr double kOffsetUnit = 0.01;
 /// Of that unit: how far a scan's hole is from the source says nothing.
 constexpr double kLargestOffset = 10;
+/// Points of a scan whose mean a vertex is pulled to: their noise is a third of a single one's.
+constexpr std::size_t kPulledBy = 8;
+/// Of the extent.
+constexpr double kFarthestPull = 0.05;
 /// In deviations. Fingertips reach 20, and would drown all else that a network sees.
 constexpr float kLargestSignature = 5;
 /// Of the mean: signatures that are the same all over say nothing, and must not be magnified.
@@ -70,8 +75,23 @@ Eigen::MatrixXf scanInputs(const Scan& scan, const FieldScaling& scaling) {
   return inputs;
 }
 
-void lookUpNearest(const Scan& scan, const Vertices& centroids, double unit, JacobianFieldFeatures& features) {
-  const PointTree tree(scan.points);
+/// The source with every vertex moved along its normal to the mean of the scan's points about it, V x 3.
+Vertices pulledToScan(const PointTree& tree, const Faces& faces, const Vertices& source, double farthest) {
+  const Vertices normals = vertexNormals(faces, source);
+  std::array<NearPoint, kPulledBy> near{};
+  Vertices pulled = source;
+  for (Eigen::Index v = 0; v < source.rows(); ++v) {
+    const auto found = tree.nearest(source.row(v), near);
+    double offset = 0;
+    for (std::size_t i = 0; i < found; ++i)
+      offset += normals.row(v).dot(tree.points().row(near[i].index) - source.row(v)) / static_cast<double>(found);
+    pulled.row(v) += std::clamp(offset, -farthest, farthest) * normals.row(v);
+  }
+  return pulled;
+}
+
+void lookUpNearest(const PointTree& tree, const Scan& scan, const Vertices& centroids, double unit,
+                   JacobianFieldFeatures& features) {
   features.nearest.resize(static_cast<std::size_t>(centroids.rows()));
   features.offsets = Eigen::MatrixXf::Zero(centroids.rows(), kOffsetInputs);
   for (Eigen::Index f = 0; f < centroids.rows(); ++f) {
@@ -80,7 +100,8 @@ void lookUpNearest(const Scan& scan, const Vertices& centroids, double unit, Jac
     const Eigen::RowVector3d offset = (scan.points.row(point) - centroids.row(f)) / unit;
     features.offsets.row(f).head<3>() = (offset * std::min(1.0, kLargestOffset / offset.norm())).cast<float>();
     if (scan.normals.rows() == 0) continue;
-    features.offsets.row(f).tail<3>() = features.scan.row(point).tail<3>() - features.triangles.row(f).segment<3>(3);
+    features.offsets.row(f).segment<3>(3) =
+        features.scan.row(point).tail<3>() - features.triangles.row(f).segment<3>(3);
   }
 }
 
@@ -134,7 +155,10 @@ JacobianFieldFeatures jacobianFieldFeatures(const FieldReference& reference, con
   features.current = reference.poisson->jacobians(source);
   features.centroids = reference.poisson->centroids(source);
   features.scan = scanInputs(scan, scaling);
-  lookUpNearest(scan, centroids, kOffsetUnit * scaling.extent, features);
+  const PointTree tree(scan.points);
+  lookUpNearest(tree, scan, centroids, kOffsetUnit * scaling.extent, features);
+  const auto pulled = pulledToScan(tree, reference.poisson->topology().faces(), source, kFarthestPull * scaling.extent);
+  features.offsets.rightCols<9>() = (reference.poisson->jacobians(pulled) - features.current).cast<float>();
   return features;
 }
 

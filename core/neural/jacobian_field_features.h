@@ -18,7 +18,7 @@ constexpr int kTriangleInputs = 6 + kFieldSignatures;
 /// What its second PointNet sees of a scan's point: position, normal.
 constexpr int kScanInputs = 6;
 /// Columns of JacobianFieldFeatures::offsets.
-constexpr int kOffsetInputs = 6;
+constexpr int kOffsetInputs = 15;
 
 /// The shape that Jacobians of one topology's shapes are taken against: the mean of a model, or any template.
 struct FieldReference {
@@ -57,8 +57,9 @@ struct JacobianFieldFeatures {
   Vertices centroids;         ///< C x 3: of the source's components [m]
   Eigen::MatrixXf scan;       ///< P x 6: the scan's points, scaled, and unit normals, 0 where unknown
   std::vector<std::int32_t> nearest;  ///< F: the scan's point nearest to each triangle's centroid
-  /// F x 6: from the centroid to that point, in hundredths of the extent and cut at 10 of them, and from the triangle's
-  /// normal to the point's (0 where that is unknown).
+  /// F x 15: from the centroid to that point, in hundredths of the extent and cut at 10 of them; from the triangle's
+  /// normal to the point's (0 where that is unknown); and how the current Jacobian changes when every vertex is moved
+  /// along its normal to the mean of the 8 points nearest to it, by at most a twentieth of the extent.
   Eigen::MatrixXf offsets;
 };
 

@@ -14,7 +14,7 @@ struct FieldTensors {
   torch::Tensor current;    ///< F x 9, F64
   torch::Tensor scan;       ///< P x 6
   torch::Tensor nearest;    ///< F, I64
-  torch::Tensor offsets;    ///< F x 6
+  torch::Tensor offsets;    ///< F x 15
 };
 
 FieldTensors tensorsOf(const JacobianFieldFeatures& features, torch::Dtype type);

@@ -32,7 +32,7 @@ std::vector<Linear> randomLayers(const std::vector<Eigen::Index>& widths, unsign
 
 JacobianFieldWeights randomWeights(const FieldScaling& scaling, bool offsets) {
   return {scaling, randomLayers({56, 20, 12}, 1), randomLayers({6, 16, 10}, 2),
-          randomLayers({65 + 2 * (12 + 10) + (offsets ? 6 : 0), 24, 24, 24, 9}, 3), offsets};
+          randomLayers({65 + 2 * (12 + 10) + (offsets ? 15 : 0), 24, 24, 24, 9}, 3), offsets};
 }
 
 /// A tube as the reference, a bent fatter one as the source, and a scan of something near.
@@ -94,12 +94,35 @@ TEST_CASE("a field's features are what each triangle and point is, scaled") {
     CHECK((features.offsets.row(f).head<3>().cast<double>() - offset * std::min(1.0, 10 / offset.norm())).norm() <
           1e-5);
     const Eigen::RowVector3d turned = example.scan.normals.row(nearest).normalized() - normals.row(f);
-    CHECK((features.offsets.row(f).tail<3>().cast<double>() - turned).norm() < 1e-6);
+    CHECK((features.offsets.row(f).segment<3>(3).cast<double>() - turned).norm() < 1e-6);
   }
   CHECK(features.offsets.leftCols<3>().rowwise().norm().maxCoeff() < 10.0001F);
   CHECK(features.current.isApprox(example.reference.poisson->jacobians(example.source)));
   for (Eigen::Index p = 0; p < example.scan.points.rows(); ++p)
     CHECK(features.scan.row(p).tail<3>().norm() == Approx(1));
+}
+
+TEST_CASE("the last offsets are the Jacobians of a source that is pulled to a dense scan along its normals") {
+  Example example;
+  const auto& faces = example.mesh.topology->faces();
+  const Vertices normals = vertexNormals(faces, example.source);
+  const auto pulledBy = [&](double distance) -> Eigen::MatrixXf {
+    // Eight points about where each vertex is to go, so that their mean is there.
+    example.scan = {Vertices(8 * example.source.rows(), 3), {}, {}};
+    for (Eigen::Index v = 0; v < example.source.rows(); ++v)
+      for (int i = 0; i < 8; ++i) {
+        const Eigen::RowVector3d about(i & 1 ? 1 : -1, i & 2 ? 1 : -1, i & 4 ? 1 : -1);
+        example.scan.points.row(8 * v + i) = example.source.row(v) + distance * normals.row(v) + 1e-4 * about;
+      }
+    return example.features().offsets.rightCols<9>();
+  };
+  const auto expected = [&](double distance) -> Eigen::MatrixXf {
+    return example.reference.poisson->jacobians(distance * normals).cast<float>();
+  };
+  const double cut = 0.05 * example.scaling.extent;
+  CHECK(pulledBy(0.5 * cut).isApprox(expected(0.5 * cut), 1e-3F));
+  CHECK(pulledBy(-0.5 * cut).isApprox(expected(-0.5 * cut), 1e-3F));
+  CHECK(pulledBy(1.2 * cut).isApprox(expected(cut), 1e-3F));
 }
 
 TEST_CASE("the reference's own signatures have mean 0 and deviation 1 over its surface, and fit in the unit box") {
@@ -113,7 +136,7 @@ TEST_CASE("the reference's own signatures have mean 0 and deviation 1 over its s
   CHECK(((shares * signatures.cwiseAbs2()).array() - 1).abs().maxCoeff() < 1e-3F);
   CHECK(features.triangles.leftCols<3>().cwiseAbs().maxCoeff() < 1);
   CHECK(features.scan.rightCols<3>().isZero(0));
-  CHECK(features.offsets.rightCols<3>().isZero(0));
+  CHECK(features.offsets.middleCols<3>(3).isZero(0));
 }
 
 TEST_CASE("a field adds a perceptron's answer to each triangle's current Jacobian") {
@@ -190,7 +213,7 @@ TEST_CASE("fields refuse networks that do not fit together") {
   const Example example;
   auto weights = randomWeights(example.scaling, false);
   weights.offsets = true;
-  CHECK_THROWS_WITH(JacobianField(weights), Catch::Contains("mlp: takes 109 features to 9 numbers, want 115 to 9"));
+  CHECK_THROWS_WITH(JacobianField(weights), Catch::Contains("mlp: takes 109 features to 9 numbers, want 124 to 9"));
   weights = randomWeights(example.scaling, false);
   weights.scan_net = randomLayers({3, 16, 10}, 2);
   CHECK_THROWS_WITH(JacobianField(weights), Catch::Contains("scan_net: takes 3 features, want 6"));
