@@ -95,8 +95,8 @@ class Sequence {
     fit.pose_deviation = 0.5;
     fit.identity = identity;
     fit.pose = fit.placement = pose;
-    fit.max_iterations = 4;
-    fit.tolerance = 1e-4;
+    fit.max_iterations = 3;
+    fit.tolerance = 1e-7;  // a step not worth taking would pass for a surface at rest
     fit.stop = options_.stop;
     return fit;
   }

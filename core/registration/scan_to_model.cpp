@@ -19,8 +19,8 @@ BodyFitOptions fitOptions(const ModelFitOptions& options, const ModelFitLevel& l
   fit.observations = options.observations;
   fit.pose_deviation = options.pose_deviation;
   // The pairs are renewed at once: a few steps on the old ones are enough.
-  fit.max_iterations = 4;
-  fit.tolerance = 1e-4;
+  fit.max_iterations = 3;
+  fit.tolerance = 1e-7;  // a step not worth taking would pass for a surface at rest
   fit.stop = options.stop;
   return fit;
 }

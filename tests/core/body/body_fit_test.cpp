@@ -125,7 +125,7 @@ TEST_CASE("several frames of one person agree on an identity that a single frame
   }
   BodyFitOptions options;
   options.prior = 1e-4;
-  options.tolerance = 1e-12;
+  options.max_iterations = 500;
   const auto both = fitBodies(model, start, targets, options);
   CHECK(both.converged());
   CHECK((both.solution.identity - truth).cwiseAbs().maxCoeff() < 0.02);
