@@ -169,15 +169,18 @@ Solved<BodyState> BodyTakeFitter::fitFrom(BodyState body, const MarkerPositions&
   fitting.identity = identity;
   fitting.stop = options_.stop;
   Outcome outcome;
+  Vertices offsets;
   for (int round = 0; round < rounds && !options_.stop.stop_requested(); ++round) {
     const auto places = placesOn(body);
+    // The mean of what two rounds say: where a bone turns against its marker's offset, full steps would sway for ever.
+    offsets = round == 0 ? places.offsets : Vertices(0.5 * (offsets + places.offsets));
     scale = std::max(scale, last_scale);
     const auto weight = weights(distances(markers, body), scale);
     std::vector<SurfaceTarget> targets;
     for (Eigen::Index l = 0; l < markers.rows(); ++l) {
       const auto& site = sites_[static_cast<std::size_t>(l)];
       if (weight[l] > 0)
-        targets.push_back({site.corners, site.barycentric, (markers.row(l) - places.offsets.row(l)).transpose(),
+        targets.push_back({site.corners, site.barycentric, (markers.row(l) - offsets.row(l)).transpose(),
                            Eigen::Vector3d::Zero(), weight[l]});
     }
     fitting.observations = weight.sum();
