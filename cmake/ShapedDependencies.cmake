@@ -68,6 +68,23 @@ if(SHAPED_SUPERNODAL)
   target_link_libraries(shaped_ceres INTERFACE shaped_suitesparse)
 endif()
 
+# LibTorch, which core/training alone links: the daemon would start with 286 more shared libraries. Its own CMake package is not
+# asked: it looks for Protobuf and Caffe2's targets again and sets flags for everybody. Clang 14 cannot compile it as C++20.
+if(SHAPED_TRAINER AND CMAKE_CXX_COMPILER_ID STREQUAL "GNU")
+  find_path(SHAPED_TORCH_INCLUDE_DIR torch/torch.h PATH_SUFFIXES torch/csrc/api/include)
+  find_library(SHAPED_TORCH_LIBRARY torch_cpu)
+  find_library(SHAPED_C10_LIBRARY c10)
+  mark_as_advanced(SHAPED_TORCH_INCLUDE_DIR SHAPED_TORCH_LIBRARY SHAPED_C10_LIBRARY)
+  if(SHAPED_TORCH_INCLUDE_DIR AND SHAPED_TORCH_LIBRARY AND SHAPED_C10_LIBRARY)
+    add_library(shaped_torch INTERFACE)
+    target_include_directories(shaped_torch SYSTEM INTERFACE ${SHAPED_TORCH_INCLUDE_DIR})
+    target_link_libraries(shaped_torch INTERFACE ${SHAPED_TORCH_LIBRARY} ${SHAPED_C10_LIBRARY})
+  endif()
+endif()
+if(NOT TARGET shaped_torch)
+  message(STATUS "no shaped-trainer in this build: it takes g++ and libtorch-dev, and SHAPED_TRAINER=ON")
+endif()
+
 if(SHAPED_TESTS)
   find_package(Catch2 2 CONFIG REQUIRED)
   find_package(benchmark CONFIG REQUIRED)

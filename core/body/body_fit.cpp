@@ -4,6 +4,7 @@
 
 #include <Eigen/Cholesky>
 #include <cmath>
+#include <deque>
 
 #include "core/body/body_residuals.h"
 #include "core/numerics/error.h"
@@ -99,6 +100,45 @@ void applyLimits(ceres::Problem& problem, const JointLimits& limits, double* rot
   }
 }
 
+/// One frame's pose as Ceres moves it, and its cost.
+class FittedFrame {
+ public:
+  FittedFrame(const BodyModel& model, std::span<const SurfaceTarget> targets, const BodyFitOptions& options,
+              const Pose& pose, double prior_share)
+      : residuals_(model, targets, options, prior_share), cost_(model, residuals_), pose_(pose) {
+    placement_ << pose.translation, pose.rotations.row(0).transpose();
+  }
+  FittedFrame(const FittedFrame&) = delete;
+
+  void addTo(ceres::Problem& problem, Eigen::VectorXd& identity, const BodyModel& model,
+             const BodyFitOptions& options) {
+    std::vector<double*> blocks{identity.data(), placement_.data()};
+    double* const joints = pose_.rotations.data() + 3;
+    const bool jointed = pose_.rotations.rows() > 1;
+    if (jointed) blocks.push_back(joints);
+    problem.AddResidualBlock(&cost_, nullptr, blocks);
+    if (!options.placement) problem.SetParameterBlockConstant(placement_.data());
+    if (!jointed) return;
+    if (!options.pose)
+      problem.SetParameterBlockConstant(joints);
+    else if (options.limits && model.parts().limits)
+      applyLimits(problem, *model.parts().limits, joints);
+  }
+
+  Pose pose() const {
+    Pose result = pose_;
+    result.translation = placement_.head<3>();
+    result.rotations.row(0) = placement_.tail<3>().transpose();
+    return result;
+  }
+
+ private:
+  BodyResiduals residuals_;
+  Cost cost_;
+  Eigen::Matrix<double, 6, 1> placement_;
+  Pose pose_;
+};
+
 Outcome outcomeOf(const ceres::Solver::Summary& summary) {
   Outcome outcome;
   outcome.iterations = std::max(0, int(summary.iterations.size()) - 1);
@@ -151,39 +191,39 @@ std::optional<std::string> BodyFitOptions::firstViolation() const {
   return std::nullopt;
 }
 
-Solved<BodyState> fitBody(const BodyModel& model, const BodyState& start, std::span<const SurfaceTarget> targets,
-                          const BodyFitOptions& options) {
+Solved<BodySequence> fitBodies(const BodyModel& model, const BodySequence& start,
+                               std::span<const std::vector<SurfaceTarget>> targets, const BodyFitOptions& options) {
   if (const auto problem = options.firstViolation()) throw InvalidInput("options", *problem);
-  requireTargets(targets, model.topology()->vertexCount());
-  model.posed(start);  // says what does not fit
-  BodyState state = start;
-  const BodyResiduals residuals(model, targets, options);
-  double* const identity = state.identity.data();
-  Eigen::Matrix<double, 6, 1> placement;
-  placement << state.pose.translation, state.pose.rotations.row(0).transpose();
-  double* const joints = state.pose.rotations.data() + 3;
-  const bool jointed = model.skeleton().jointCount() > 1;
-
+  if (targets.empty() || start.poses.size() != targets.size())
+    throw InvalidInput("start.poses", "has " + std::to_string(start.poses.size()) + " entries and targets " +
+                                          std::to_string(targets.size()) + ", want one for each of at least one frame");
   ceres::Problem::Options ownership;
   ownership.cost_function_ownership = ceres::DO_NOT_TAKE_OWNERSHIP;
   ceres::Problem problem(ownership);
-  Cost cost(model, residuals);
-  std::vector<double*> blocks{identity, placement.data()};
-  if (jointed) blocks.push_back(joints);
-  problem.AddResidualBlock(&cost, nullptr, blocks);
-  if (jointed && options.limits && options.pose && model.parts().limits)
-    applyLimits(problem, *model.parts().limits, joints);
-  if (!options.identity) problem.SetParameterBlockConstant(identity);
-  if (!options.placement) problem.SetParameterBlockConstant(placement.data());
-  if (jointed && !options.pose) problem.SetParameterBlockConstant(joints);
-
+  Eigen::VectorXd identity = start.identity;
+  std::deque<FittedFrame> frames;  // they stay where Ceres was told
+  for (std::size_t f = 0; f < targets.size(); ++f) {
+    requireTargets(targets[f], model.topology()->vertexCount());
+    model.posed({start.identity, start.poses[f]});  // says what does not fit
+    frames.emplace_back(model, targets[f], options, start.poses[f], 1.0 / double(targets.size()));
+    frames.back().addTo(problem, identity, model, options);
+  }
+  if (!options.identity) problem.SetParameterBlockConstant(identity.data());
   StopCallback callback(options.stop);
   ceres::Solver::Summary summary;
   ceres::Solve(solverOptions(options, &callback), &problem, &summary);
-  state.pose.translation = placement.head<3>();
-  state.pose.rotations.row(0) = placement.tail<3>().transpose();
   const Outcome outcome = outcomeOf(summary);
-  return {outcome.termination == Termination::kNumericalFailure ? start : state, outcome};
+  if (outcome.termination == Termination::kNumericalFailure) return {start, outcome};
+  BodySequence solution{std::move(identity), {}};
+  for (const auto& frame : frames) solution.poses.push_back(frame.pose());
+  return {std::move(solution), outcome};
+}
+
+Solved<BodyState> fitBody(const BodyModel& model, const BodyState& start, std::span<const SurfaceTarget> targets,
+                          const BodyFitOptions& options) {
+  const std::vector<SurfaceTarget> frame(targets.begin(), targets.end());
+  const auto solved = fitBodies(model, {start.identity, {start.pose}}, {&frame, 1}, options);
+  return {BodyState{solved.solution.identity, solved.solution.poses.front()}, solved};
 }
 
 std::vector<SurfaceTarget> vertexTargets(const Vertices& shape) {

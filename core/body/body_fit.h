@@ -47,6 +47,18 @@ struct BodyFitOptions {
 Solved<BodyState> fitBody(const BodyModel& model, const BodyState& start, std::span<const SurfaceTarget> targets,
                           const BodyFitOptions& options = {});
 
+/// One person in several poses.
+struct BodySequence {
+  Eigen::VectorXd identity;  ///< k
+  std::vector<Pose> poses;
+};
+
+/// The same for several frames with one identity: the energies of the frames add up, the identity's prior counts once.
+/// targets: one list a frame, at least one frame. The effort of a step grows with the number of frames that may move to
+/// the power of three; with `pose` and `placement` off only the identity is solved for, and any number of frames goes.
+Solved<BodySequence> fitBodies(const BodyModel& model, const BodySequence& start,
+                               std::span<const std::vector<SurfaceTarget>> targets, const BodyFitOptions& options = {});
+
 /// One target a vertex: a shape in correspondence, V x 3.
 std::vector<SurfaceTarget> vertexTargets(const Vertices& shape);
 

@@ -46,12 +46,12 @@ class BodyResiduals::TargetRows {
 };
 
 BodyResiduals::BodyResiduals(const BodyModel& model, std::span<const SurfaceTarget> targets,
-                             const BodyFitOptions& options)
+                             const BodyFitOptions& options, double prior_share)
     : model_(model), targets_(targets), parameters_(model.modeCount() + 3 + 3 * model.skeleton().jointCount()) {
   double weights = 0;
   for (const auto& target : targets) weights += target.weight;
   scale_ = weights > 0 ? std::sqrt(options.observations / weights) / options.sigma : 0;
-  identity_prior_ = std::sqrt(options.prior);
+  identity_prior_ = std::sqrt(options.prior * prior_share);
   joint_prior_ = std::sqrt(options.prior) / options.pose_deviation;
 }
 

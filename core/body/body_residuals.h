@@ -13,8 +13,10 @@ class BodyResiduals {
  public:
   using Rows = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>;
 
-  /// model, targets: must outlive it. Weights and options must be valid.
-  BodyResiduals(const BodyModel& model, std::span<const SurfaceTarget> targets, const BodyFitOptions& options);
+  /// model, targets: must outlive it. Weights and options must be valid. prior_share: of the identity's prior, where
+  /// several bodies share one identity.
+  BodyResiduals(const BodyModel& model, std::span<const SurfaceTarget> targets, const BodyFitOptions& options,
+                double prior_share = 1);
 
   Eigen::Index parameterCount() const { return parameters_; }
   /// The sum of squares.

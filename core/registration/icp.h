@@ -3,8 +3,8 @@
 #include <vector>
 
 #include "core/mesh/alignment.h"
-#include "core/registration/point_tree.h"
 #include "core/registration/surface_samples.h"
+#include "core/surface/point_tree.h"
 
 namespace shaped {
 

@@ -7,7 +7,7 @@
 #include <random>
 
 #include "core/mesh/quality.h"
-#include "core/registration/deformation.h"
+#include "core/registration/surface_samples.h"
 
 namespace shaped {
 namespace {
@@ -32,18 +32,6 @@ std::vector<std::int32_t> shuffled(std::int32_t n) {
   return order;
 }
 
-/// Vertices chosen evenly by area: those where the running share passes a multiple of 1 / count.
-std::vector<std::int32_t> evenChoice(const Eigen::VectorXd& shares, int count) {
-  std::vector<std::int32_t> chosen;
-  double passed = 0;
-  for (Eigen::Index v = 0; v < shares.size(); ++v) {
-    const double before = std::floor(passed * count);
-    passed += shares[v];
-    if (std::floor(passed * count) > before) chosen.push_back(std::int32_t(v));
-  }
-  return chosen;
-}
-
 double middle(std::vector<double>& values, double share) {
   if (values.empty()) return 0;
   const auto at = values.begin() + std::ptrdiff_t(share * double(values.size() - 1));
@@ -58,9 +46,9 @@ ModelPairs::ModelPairs(const ScanSurface& scan, const BodyModel& model, const Mo
       model_(model),
       options_(options),
       least_cosine_(std::cos(options.max_normal_angle * std::numbers::pi / 180)),
-      shares_(areaShares(model.topology()->faces(), model.parts().mean)),
       scan_order_(shuffled(std::int32_t(scan.points().rows()))) {
-  for (Eigen::Index v = 0; v < shares_.size(); ++v) region_.push_back(foremostJoint(model.parts().weights, v));
+  for (Eigen::Index v = 0; v < model.parts().mean.rows(); ++v)
+    region_.push_back(foremostJoint(model.parts().weights, v));
 }
 
 bool ModelPairs::facing(const Eigen::RowVector3d& scan_normal, const Eigen::RowVector3d& model_normal) const {
@@ -80,7 +68,7 @@ std::vector<SurfaceTarget> ModelPairs::find(const Vertices& surface, const Model
 void ModelPairs::addFromModel(const Vertices& surface, const Vertices& normals, const ModelFitLevel& level,
                               std::vector<SurfaceTarget>& targets) const {
   const RobustLoss loss{RobustLoss::Kind::kGemanMcClure, level.loss_scale};
-  const auto chosen = evenChoice(shares_, level.points);
+  const auto chosen = verticesByArea(model_.topology()->faces(), model_.parts().mean, level.points);
   for (const std::int32_t v : chosen) {
     const ScanPoint found = scan_.closest(surface.row(v));
     if (found.distance > level.max_distance || (options_.reject_boundary && found.boundary) ||

@@ -32,7 +32,6 @@ class ModelPairs {
   const BodyModel& model_;
   const ModelFitOptions& options_;
   double least_cosine_;
-  Eigen::VectorXd shares_;                ///< of the model's area, a vertex
   std::vector<std::int32_t> region_;      ///< the joint that carries each vertex foremost
   std::vector<std::int32_t> scan_order_;  ///< the scan's points, shuffled: the first few are an even choice
 };

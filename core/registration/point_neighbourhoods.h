@@ -2,7 +2,7 @@
 
 #include <vector>
 
-#include "core/registration/point_tree.h"
+#include "core/surface/point_tree.h"
 
 namespace shaped {
 

@@ -6,33 +6,12 @@
 
 #include "core/mesh/quality.h"
 #include "core/numerics/error.h"
+#include "core/registration/landmark_targets.h"
 #include "core/registration/model_pairs.h"
 #include "core/skeleton/rotation.h"
 
 namespace shaped {
 namespace {
-
-std::vector<SurfaceTarget> landmarkTargets(const std::vector<Landmark>& landmarks, const Faces& faces, double weight) {
-  std::vector<SurfaceTarget> targets;
-  double sum = 0;
-  for (std::size_t i = 0; i < landmarks.size(); ++i) {
-    const auto& landmark = landmarks[i];
-    const std::string where = "landmarks[" + std::to_string(i) + "]";
-    if (landmark.anchor.face < 0 || landmark.anchor.face >= faces.rows())
-      throw InvalidInput(where, "is on face " + std::to_string(landmark.anchor.face) + ", and the model has " +
-                                    std::to_string(faces.rows()));
-    if (!landmark.position.allFinite() || !(landmark.weight >= 0)) throw InvalidInput(where, "is not finite");
-    SurfaceTarget target;
-    for (int c = 0; c < 3; ++c) target.corners[std::size_t(c)] = faces(landmark.anchor.face, c);
-    target.barycentric = landmark.anchor.barycentric;
-    target.position = landmark.position;
-    target.weight = landmark.weight;
-    sum += landmark.weight;
-    targets.push_back(target);
-  }
-  for (auto& target : targets) target.weight *= sum > 0 ? weight / sum : 0;
-  return targets;
-}
 
 BodyFitOptions fitOptions(const ModelFitOptions& options, const ModelFitLevel& level) {
   BodyFitOptions fit;
@@ -118,11 +97,16 @@ Solved<ModelFit> fitModelToScan(const ScanSurface& scan, const BodyModel& model,
 }
 
 BodyState placedState(const BodyModel& model, const RigidMotion& motion) {
-  BodyState state = model.meanState();
-  state.pose.rotations.row(0) = axisAngle(motion.rotation).transpose();
+  return carried(model, model.meanState(), motion);
+}
+
+BodyState carried(const BodyModel& model, const BodyState& state, const RigidMotion& motion) {
+  BodyState moved = state;
+  const Eigen::Matrix3d turn = rotationMatrix(state.pose.rotations.row(0).transpose());
+  moved.pose.rotations.row(0) = axisAngle(motion.rotation * turn).transpose();
   const Eigen::Vector3d root = model.restJoints(state.identity).row(0).transpose();
-  state.pose.translation = motion.rotation * root + motion.translation - root;
-  return state;
+  moved.pose.translation = motion.rotation * (root + state.pose.translation) + motion.translation - root;
+  return moved;
 }
 
 }  // namespace shaped

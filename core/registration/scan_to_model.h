@@ -28,7 +28,7 @@ struct ModelFitOptions {
                                        {20000, 0.05, 0.015, 0.005, true, 6}};
   double max_normal_angle = 60;  ///< gate, degrees, (0, 180]
   bool reject_boundary = true;   ///< gate
-  double pose_deviation = 0.5;   ///< BodyFitOptions
+  double pose_deviation = 0.2;   ///< BodyFitOptions
   double observations = 1000;    ///< BodyFitOptions
   double landmark_weight = 1;    ///< of all landmarks together, relative to one side of the scan, >= 0
   double tolerance = 1e-4;       ///< of a round: root mean square motion of the model's vertices, m, > 0
@@ -71,5 +71,7 @@ Solved<ModelFit> fitModelToScan(const ScanSurface& scan, const BodyModel& model,
 
 /// The mean body where a rigid motion carries it.
 BodyState placedState(const BodyModel& model, const RigidMotion& motion);
+/// A body moved rigidly as a whole.
+BodyState carried(const BodyModel& model, const BodyState& state, const RigidMotion& motion);
 
 }  // namespace shaped

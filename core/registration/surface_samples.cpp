@@ -6,6 +6,7 @@
 
 #include "core/mesh/quality.h"
 #include "core/numerics/error.h"
+#include "core/registration/deformation.h"
 
 namespace shaped {
 namespace {
@@ -38,6 +39,18 @@ SurfaceSamples sampleByArea(const Faces& faces, const Vertices& vertices, int co
     samples.normals.row(i) = normals.row(face);
   }
   return samples;
+}
+
+std::vector<std::int32_t> verticesByArea(const Faces& faces, const Vertices& vertices, int count) {
+  const Eigen::VectorXd shares = areaShares(faces, vertices);
+  std::vector<std::int32_t> chosen;
+  double passed = 0;
+  for (Eigen::Index v = 0; v < shares.size(); ++v) {
+    const double before = std::floor(passed * count);
+    passed += shares[v];
+    if (std::floor(passed * count) > before) chosen.push_back(std::int32_t(v));
+  }
+  return chosen;
 }
 
 SurfaceSamples everyFew(const Vertices& points, const Vertices& normals, int count) {

@@ -94,6 +94,20 @@ class Layers(unittest.TestCase):
                 if include == "server/jobs/sqlite_job_registry.h":
                     self.assertIn(folder, ("jobs", "daemon"), f"{path.relative_to(ROOT)} knows how jobs are stored")
 
+    def test_only_training_and_the_trainer_know_libtorch(self):
+        torch = re.compile(r"^(torch|ATen|c10|caffe2)/")
+        for path in sources("core", "server", "client", "trace"):
+            folder = "/".join(path.relative_to(ROOT).parts[:2])
+            for include in includes(path):
+                if torch.match(include):
+                    self.assertIn(folder, ("core/training", "server/trainer"), f"{path.relative_to(ROOT)} includes {include}")
+                if include.startswith(("core/training/", "server/trainer/")):
+                    self.assertIn(folder, ("core/training", "server/trainer"), f"{path.relative_to(ROOT)} includes {include}")
+        for path in (file for top in ("core", "server", "client", "trace", "tests") for file in (ROOT / top).rglob("CMakeLists.txt")):
+            folder = str(path.parent.relative_to(ROOT))
+            if re.search(r"shaped_(torch|training|server_trainer)\b(?!_tests)", path.read_text()):
+                self.assertIn(folder, ("core", "core/training", "server", "server/trainer", "tests"), path)
+
     def test_traces_stand_alone(self):
         for path in sources("trace"):
             for include in includes(path):

@@ -41,6 +41,10 @@ void denoising();
 void bodyModels();
 /// Row "registration".
 void registration();
+/// Row "clothing".
+void clothing();
+/// Row "robustness".
+void robustness();
 /// Row "stop".
 void stopLatency();
 

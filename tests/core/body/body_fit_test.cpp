@@ -110,6 +110,34 @@ TEST_CASE("parts of a state that are held do not move, and joints stay within th
   CHECK(held.pose.rotations.norm() == 0);
 }
 
+TEST_CASE("several frames of one person agree on an identity that a single frame leaves open") {
+  const auto model = tubeModel(4, 10, 3);
+  const Eigen::VectorXd truth = randomIdentity(model, 4);
+  // Each frame shows another half of the body.
+  std::vector<std::vector<SurfaceTarget>> targets;
+  BodySequence start{Eigen::VectorXd::Zero(3), {}};
+  for (unsigned f = 0; f < 2; ++f) {
+    const Pose pose = randomPose(model.skeleton(), 0.3, f);
+    auto all = vertexTargets(model.posed({truth, pose}).vertices());
+    std::erase_if(all, [&](const SurfaceTarget& t) { return (model.parts().mean(t.corners[0], 0) > 0) == (f == 0); });
+    targets.push_back(all);
+    start.poses.push_back(restPose(model.skeleton()));
+  }
+  BodyFitOptions options;
+  options.prior = 1e-4;
+  options.tolerance = 1e-12;
+  const auto both = fitBodies(model, start, targets, options);
+  CHECK(both.converged());
+  CHECK((both.solution.identity - truth).cwiseAbs().maxCoeff() < 0.02);
+  const auto first = fitBody(model, {start.identity, start.poses[0]}, targets[0], options);
+  CHECK((first.solution.identity - truth).norm() > 2 * (both.solution.identity - truth).norm());
+  options.pose = options.placement = false;
+  const auto held = fitBodies(model, start, targets, options);
+  CHECK(held.solution.poses[1].rotations.norm() == 0);
+  CHECK(held.solution.identity.norm() > 0);
+  CHECK_THROWS_WITH(fitBodies(model, {start.identity, {}}, targets), Catch::Contains("start.poses: has 0 entries"));
+}
+
 TEST_CASE("a body fit says how it ended") {
   const auto model = tubeModel(4, 10, 3);
   const BodyState truth{randomIdentity(model, 4), randomPose(model.skeleton(), 0.5, 6)};

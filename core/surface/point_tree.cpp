@@ -1,4 +1,4 @@
-#include "core/registration/point_tree.h"
+#include "core/surface/point_tree.h"
 
 #include <nanoflann.hpp>
 #include <vector>

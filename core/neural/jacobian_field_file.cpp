@@ -1,0 +1,52 @@
+#include "core/neural/jacobian_field_file.h"
+
+namespace shaped {
+namespace {
+
+std::string layerName(const std::string& net, std::size_t layer) { return net + "." + std::to_string(layer); }
+
+void addNet(const std::string& net, const std::vector<Linear>& layers, TensorWriter& file) {
+  for (std::size_t i = 0; i < layers.size(); ++i) {
+    file.addMatrix(layerName(net, i) + ".weight", layers[i].weight);
+    file.addMatrix(layerName(net, i) + ".bias", layers[i].bias.transpose());
+  }
+}
+
+std::vector<Linear> readNet(const TensorFile& file, const std::string& net) {
+  std::vector<Linear> layers;
+  do {
+    const auto layer = layerName(net, layers.size());
+    const Eigen::MatrixXf weight = file.matrix<float>(layer + ".weight");
+    layers.push_back({weight, file.matrix<float>(layer + ".bias", 1, weight.rows()).transpose()});
+  } while (file.has(layerName(net, layers.size()) + ".weight"));
+  return layers;
+}
+
+}  // namespace
+
+void addJacobianField(const std::string& name, const JacobianFieldWeights& weights, TensorWriter& file) {
+  const auto& scaling = weights.scaling;
+  file.addMatrix(name + ".scaling.centre", scaling.centre);
+  file.addMatrix(name + ".scaling.extent", Eigen::Matrix<double, 1, 1>(scaling.extent));
+  file.addMatrix(name + ".scaling.signature_mean", scaling.signature_mean);
+  file.addMatrix(name + ".scaling.signature_deviation", scaling.signature_deviation);
+  file.addMatrix(name + ".offsets", Eigen::Matrix<std::int64_t, 1, 1>(std::int64_t{weights.offsets}));
+  addNet(name + ".source_net", weights.source_net, file);
+  addNet(name + ".scan_net", weights.scan_net, file);
+  addNet(name + ".mlp", weights.mlp, file);
+}
+
+JacobianFieldWeights readJacobianField(const TensorFile& file, const std::string& name) {
+  JacobianFieldWeights weights;
+  weights.scaling.centre = file.matrix<double>(name + ".scaling.centre", 1, 3);
+  weights.scaling.extent = file.matrix<double>(name + ".scaling.extent", 1, 1)(0, 0);
+  weights.scaling.signature_mean = file.matrix<float>(name + ".scaling.signature_mean", 1, kFieldSignatures);
+  weights.scaling.signature_deviation = file.matrix<float>(name + ".scaling.signature_deviation", 1, kFieldSignatures);
+  weights.offsets = file.matrix<std::int64_t>(name + ".offsets", 1, 1)(0, 0) != 0;
+  weights.source_net = readNet(file, name + ".source_net");
+  weights.scan_net = readNet(file, name + ".scan_net");
+  weights.mlp = readNet(file, name + ".mlp");
+  return weights;
+}
+
+}  // namespace shaped
