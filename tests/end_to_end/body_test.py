@@ -206,6 +206,14 @@ class Scans(Bodies):
         self.assertEqual([region["name"] for region in document["scan_report"]["regions"]], [joint["name"] for joint in joints])
         self.assertLies(read_obj(out)[0], self.pose)
 
+    def test_a_registration_can_be_refined_beyond_the_model(self):
+        scan = self.scan(self.posed, "--still")
+        fitted = self.registered("creatures", scan)
+        refined = self.registered("creatures", scan, "--refine")
+        self.assertNotIn("refinement", fitted)
+        self.assertLess(refined["refinement"]["median_distance"], 0.003)
+        self.assertEqual(refined["coefficients"], fitted["coefficients"])
+
     def test_landmarks_place_a_scan_in_its_own_unit(self):
         handles = numpy.loadtxt(self.sample / "handles.csv", delimiter=",", skiprows=1)[:, 0].astype(int)
         landmarks = self.folder / "landmarks.json"
