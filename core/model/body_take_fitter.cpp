@@ -18,8 +18,8 @@ namespace {
 
 constexpr const char* kFormat = "body_take_state 1";
 constexpr double kMarkerNoise = 0.01;  ///< of skin and marker together, m
-constexpr double kStillness = 1e-4;    ///< markers that move less than this from round to round stand still, m
-constexpr int kFirstRounds = 20, kNextRounds = 4;
+constexpr double kStillness = 3e-4;    ///< markers that move less than this from round to round stand still, m
+constexpr int kFirstRounds = 30, kNextRounds = 12;
 
 bool seen(const MarkerPositions& markers, Eigen::Index l) { return markers.row(l).allFinite(); }
 
@@ -169,15 +169,19 @@ Solved<BodyState> BodyTakeFitter::fitFrom(BodyState body, const MarkerPositions&
   fitting.identity = identity;
   fitting.stop = options_.stop;
   Outcome outcome;
+  Vertices offsets;
+  bool still = false;
   for (int round = 0; round < rounds && !options_.stop.stop_requested(); ++round) {
     const auto places = placesOn(body);
+    // The mean of what two rounds say: where a bone turns against its marker's offset, full steps would sway for ever.
+    offsets = round == 0 ? places.offsets : Vertices(0.5 * (offsets + places.offsets));
     scale = std::max(scale, last_scale);
     const auto weight = weights(distances(markers, body), scale);
     std::vector<SurfaceTarget> targets;
     for (Eigen::Index l = 0; l < markers.rows(); ++l) {
       const auto& site = sites_[static_cast<std::size_t>(l)];
       if (weight[l] > 0)
-        targets.push_back({site.corners, site.barycentric, (markers.row(l) - places.offsets.row(l)).transpose(),
+        targets.push_back({site.corners, site.barycentric, (markers.row(l) - offsets.row(l)).transpose(),
                            Eigen::Vector3d::Zero(), weight[l]});
     }
     fitting.observations = weight.sum();
@@ -187,9 +191,11 @@ Solved<BodyState> BodyTakeFitter::fitFrom(BodyState body, const MarkerPositions&
     outcome.iterations = iterations;
     body = std::move(solved.solution);
     const double motion = (placesOn(body).markers - places.markers).rowwise().norm().maxCoeff();
-    if (scale <= last_scale && motion < kStillness) break;
+    still = scale <= last_scale && motion < kStillness;
+    if (still) break;
     scale /= 2;
   }
+  if (!still && outcome.converged()) outcome.termination = Termination::kIterationLimit;
   if (options_.stop.stop_requested()) outcome.termination = Termination::kCancelled;
   return {std::move(body), outcome};
 }

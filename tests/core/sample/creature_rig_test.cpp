@@ -22,6 +22,7 @@ TEST_CASE("a creature's rig poses its mesh as the creature itself is posed") {
         0.4 * Eigen::Vector3d(std::sin(3.0 * double(b)), std::cos(5.0 * double(b)), std::sin(7.0 * double(b)));
     other.rotations.row(Eigen::Index(b)) = own.rotations[b];
   }
-  CHECK(maxVertexDistance(skinned(rig, creature.rest, other), pose(creature, own)) < 1e-4);
+  // Shares below 1e-4 are left out of the rig.
+  CHECK(maxVertexDistance(skinned(rig, creature.rest, other), pose(creature, own)) < 3e-4);
   CHECK(rig.skeleton.jointCount() == std::ssize(creature.bones));
 }
