@@ -69,8 +69,9 @@ if(SHAPED_SUPERNODAL)
 endif()
 
 # LibTorch, which core/training alone links: the daemon would start with 286 more shared libraries. Its own CMake package is not
-# asked: it looks for Protobuf and Caffe2's targets again and sets flags for everybody. Clang 14 cannot compile it as C++20.
-if(SHAPED_TRAINER AND CMAKE_CXX_COMPILER_ID STREQUAL "GNU")
+# asked: it looks for Protobuf and Caffe2's targets again and sets flags for everybody. Clang 14 cannot compile it as C++20,
+# and sanitizers see but half of what goes on in it.
+if(SHAPED_TRAINER AND CMAKE_CXX_COMPILER_ID STREQUAL "GNU" AND NOT SHAPED_SANITIZE)
   find_path(SHAPED_TORCH_INCLUDE_DIR torch/torch.h PATH_SUFFIXES torch/csrc/api/include)
   find_library(SHAPED_TORCH_LIBRARY torch_cpu)
   find_library(SHAPED_C10_LIBRARY c10)
@@ -82,7 +83,7 @@ if(SHAPED_TRAINER AND CMAKE_CXX_COMPILER_ID STREQUAL "GNU")
   endif()
 endif()
 if(NOT TARGET shaped_torch)
-  message(STATUS "no shaped-trainer in this build: it takes g++ and libtorch-dev, and SHAPED_TRAINER=ON")
+  message(STATUS "no shaped-trainer in this build: it takes g++ without sanitizers, libtorch-dev, and SHAPED_TRAINER=ON")
 endif()
 
 if(SHAPED_TESTS)
