@@ -32,14 +32,21 @@ v1::ScanLandmark landmarkFrom(const nlohmann::json& entry) {
 
 std::vector<v1::ScanLandmark> readScanLandmarks(const std::filesystem::path& path) {
   const auto document = parseJson(path.string(), readFile(path));
+  if (!document.is_object() || !document.contains("landmarks") || !document.at("landmarks").is_array())
+    throw InvalidInput(path.string(), "want {\"landmarks\": [...]}");
   std::vector<v1::ScanLandmark> landmarks;
-  try {
-    for (const auto& entry : document.at("landmarks")) landmarks.push_back(landmarkFrom(entry));
-  } catch (const std::exception& error) {
+  const auto refuse = [&](const std::string& problem) {
     throw InvalidInput(path.string(), "landmarks[" + std::to_string(landmarks.size()) +
                                           "]: want {\"vertex\": i or \"face\": f, \"barycentric\": [3 weights], "
-                                          "\"position\": [3 numbers]}: " +
-                                          error.what());
+                                          "\"position\": [3 numbers]}" +
+                                          problem);
+  };
+  try {
+    for (const auto& entry : document.at("landmarks")) landmarks.push_back(landmarkFrom(entry));
+  } catch (const InvalidInput& error) {
+    refuse(std::string(": ") + error.what());
+  } catch (const nlohmann::json::exception&) {  // a field is missing or of another type
+    refuse("");
   }
   return landmarks;
 }

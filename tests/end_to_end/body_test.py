@@ -249,6 +249,10 @@ class Scans(Bodies):
         landmarks = self.folder / "bad.json"
         landmarks.write_text('{"landmarks": [{"vertex": 100000, "position": [0, 0, 0]}]}')
         self.refused("landmarks[0].vertex: = 100000 is outside [0, ", "register", "creatures", scan, "--landmarks", landmarks)
+        landmarks.write_text('[{"vertex": 1, "position": [0, 0, 0]}]')
+        self.refused('bad.json: want {"landmarks": [...]}', "register", "creatures", scan, "--landmarks", landmarks)
+        landmarks.write_text('{"landmarks": [{"vertex": 1, "position": "nose"}]}')
+        self.refused("bad.json: landmarks[0]: want ", "register", "creatures", scan, "--landmarks", landmarks)
         landmarks.write_text('{"landmarks": [{"vertex": 1, "position": [0, 0]}]}')
         self.refused("bad.json: landmarks[0]: want ", "register", "creatures", scan, "--landmarks", landmarks)
         self.expect(NOT_FOUND, "register", "nobody", scan)

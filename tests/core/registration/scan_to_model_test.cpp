@@ -67,10 +67,12 @@ TEST_CASE("identity and pose are found on a scan, from a rough start, to the noi
 TEST_CASE("stray points draw a model aside where the loss is not robust") {
   VirtualScannerOptions scanner = ring();
   scanner.motion = RigidMotion{};
-  scanner.outliers = 0.08;
-  scanner.outlier_box = 0.05;
   const auto tube = scannedTube(scanner);
-  const ScanSurface surface(tube.scanned.scan);
+  // A film above one side: of every third point there, a copy four centimetres off the surface.
+  Scan scan = tube.scanned.scan;
+  for (Eigen::Index i = 0; i < scan.points.rows(); i += 3)
+    if (scan.normals(i, 1) > 0.3) scan.points.row(i) += 0.04 * scan.normals.row(i);
+  const ScanSurface surface(scan);
   const auto error = [&](double loss_scale) {
     auto options = fitOptions();
     for (auto& level : options.levels) level.loss_scale = std::max(level.loss_scale, loss_scale);
@@ -80,8 +82,8 @@ TEST_CASE("stray points draw a model aside where the loss is not robust") {
         .mean();
   };
   const double robust = error(0);
-  CHECK(robust < 2.5e-3);
-  CHECK(error(100) > robust);
+  CHECK(robust < 7e-3);
+  CHECK(error(100) > 1.5 * robust);
 }
 
 TEST_CASE("landmarks say what the surface leaves open") {
