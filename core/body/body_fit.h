@@ -41,7 +41,8 @@ struct BodyFitOptions {
 /// target i from its point, along its normal where it has one. Joints stay in the model's limits; a start outside is
 /// moved in.
 ///
-/// The residual is the relative change of the energy in the last step. Without a target of positive weight only the
+/// The residual is the relative change of the energy in the last step; converged also where a step would move no
+/// parameter by more than 1e-12 of their length, whatever the energy does. Without a target of positive weight only the
 /// priors speak. Throws InvalidInput naming the option, `start`, or `targets[i]` with a vertex that is not the model's,
 /// shares that do not sum to 1, or a number that is not finite.
 Solved<BodyState> fitBody(const BodyModel& model, const BodyState& start, std::span<const SurfaceTarget> targets,
