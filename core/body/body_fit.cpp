@@ -8,6 +8,7 @@
 
 #include "core/body/body_residuals.h"
 #include "core/numerics/error.h"
+#include "core/numerics/option_checks.h"
 
 namespace shaped {
 namespace {
@@ -178,14 +179,10 @@ ceres::Solver::Options solverOptions(const BodyFitOptions& options, ceres::Itera
 }  // namespace
 
 std::optional<std::string> BodyFitOptions::firstViolation() const {
-  const auto positive = [](const char* field, double value) -> std::optional<std::string> {
-    if (value > 0 && std::isfinite(value)) return std::nullopt;
-    return std::string(field) + " = " + std::to_string(value) + ", want > 0";
-  };
-  if (auto problem = positive("sigma", sigma)) return problem;
-  if (auto problem = positive("observations", observations)) return problem;
-  if (auto problem = positive("pose_deviation", pose_deviation)) return problem;
-  if (auto problem = positive("tolerance", tolerance)) return problem;
+  if (auto problem = unlessPositive("sigma", sigma)) return problem;
+  if (auto problem = unlessPositive("observations", observations)) return problem;
+  if (auto problem = unlessPositive("pose_deviation", pose_deviation)) return problem;
+  if (auto problem = unlessPositive("tolerance", tolerance)) return problem;
   if (!(prior >= 0) || !std::isfinite(prior)) return "prior = " + std::to_string(prior) + ", want >= 0";
   if (max_iterations < 1) return "max_iterations = " + std::to_string(max_iterations) + ", want >= 1";
   return std::nullopt;

@@ -9,6 +9,7 @@
 #include "core/clothing/clothing_pairs.h"
 #include "core/mesh/quality.h"
 #include "core/numerics/error.h"
+#include "core/numerics/option_checks.h"
 #include "core/registration/scan_checks.h"
 
 namespace shaped {
@@ -242,10 +243,6 @@ ScanRegistrationOptions clothedRegistration() {
 }
 
 std::optional<std::string> ClothingOptions::firstViolation() const {
-  const auto positive = [](const char* field, double value) -> std::optional<std::string> {
-    if (value > 0 && std::isfinite(value)) return std::nullopt;
-    return std::string(field) + " = " + std::to_string(value) + ", want > 0";
-  };
   if (fitted_alone < 1) return "fitted_alone = " + std::to_string(fitted_alone) + ", want >= 1";
   if (first_frames < 1) return "first_frames = " + std::to_string(first_frames) + ", want >= 1";
   if (points < 50) return "points = " + std::to_string(points) + ", want >= 50";
@@ -254,14 +251,14 @@ std::optional<std::string> ClothingOptions::firstViolation() const {
   for (const auto& [name, weights] : {std::pair{"first", first}, {"postures", postures}, {"refined", refined}})
     for (const double weight : {weights.landmarks, weights.data, weights.cloth})
       if (!(weight >= 0) || !std::isfinite(weight)) return std::string(name) + " holds a weight below 0";
-  if (auto problem = positive("loss_scale", loss_scale)) return problem;
-  if (auto problem = positive("outside_scale", outside_scale)) return problem;
-  if (auto problem = positive("max_distance", max_distance)) return problem;
-  if (auto problem = positive("tolerance", tolerance)) return problem;
+  if (auto problem = unlessPositive("loss_scale", loss_scale)) return problem;
+  if (auto problem = unlessPositive("outside_scale", outside_scale)) return problem;
+  if (auto problem = unlessPositive("max_distance", max_distance)) return problem;
+  if (auto problem = unlessPositive("tolerance", tolerance)) return problem;
   if (!(max_normal_angle > 0 && max_normal_angle <= 180))
     return "max_normal_angle = " + std::to_string(max_normal_angle) + ", want (0, 180]";
   if (!(good_share >= 0 && good_share <= 1)) return "good_share = " + std::to_string(good_share) + ", want 0 to 1";
-  if (retries < 0) return "retries = " + std::to_string(retries) + ", want >= 0";
+  if (retries < 1) return "retries = " + std::to_string(retries) + ", want >= 1";
   return registration.firstViolation();
 }
 

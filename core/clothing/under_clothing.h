@@ -25,7 +25,7 @@ ScanRegistrationOptions clothedRegistration();
 struct ClothingOptions {
   int fitted_alone = 16;      ///< frames, spread over the sequence, that are registered by themselves, >= 1
   double good_share = 0.975;  ///< of the best frame's score: what fits worse is tried again from other frames, 0 to 1
-  int retries = 3;            ///< poses of other frames that are tried, >= 0
+  int retries = 3;            ///< poses of other frames that are tried, >= 1
   int first_frames = 3;       ///< that the first identity is solved on, >= 1
   ClothingWeights first = {1, 1, 1};        ///< identity and posture of the first frames
   ClothingWeights postures = {0.5, 1, 10};  ///< posture after posture, the identity held

@@ -6,6 +6,7 @@
 
 #include "core/mesh/quality.h"
 #include "core/numerics/error.h"
+#include "core/numerics/option_checks.h"
 #include "core/registration/landmark_targets.h"
 #include "core/registration/model_pairs.h"
 #include "core/skeleton/rotation.h"
@@ -53,26 +54,22 @@ Outcome runLevel(const ModelPairs& pairs, const BodyModel& model, const std::vec
 }  // namespace
 
 std::optional<std::string> ModelFitOptions::firstViolation() const {
-  const auto positive = [](const std::string& field, double value) -> std::optional<std::string> {
-    if (value > 0 && std::isfinite(value)) return std::nullopt;
-    return field + " = " + std::to_string(value) + ", want > 0";
-  };
   if (levels.empty()) return "levels is empty, want at least one";
   for (std::size_t l = 0; l < levels.size(); ++l) {
     const std::string at = "levels[" + std::to_string(l) + "].";
     if (levels[l].points < 50) return at + "points = " + std::to_string(levels[l].points) + ", want >= 50";
     if (levels[l].rounds < 1) return at + "rounds = " + std::to_string(levels[l].rounds) + ", want >= 1";
-    if (auto problem = positive(at + "max_distance", levels[l].max_distance)) return problem;
-    if (auto problem = positive(at + "loss_scale", levels[l].loss_scale)) return problem;
-    if (auto problem = positive(at + "sigma", levels[l].sigma)) return problem;
+    if (auto problem = unlessPositive(at + "max_distance", levels[l].max_distance)) return problem;
+    if (auto problem = unlessPositive(at + "loss_scale", levels[l].loss_scale)) return problem;
+    if (auto problem = unlessPositive(at + "sigma", levels[l].sigma)) return problem;
   }
   if (!(max_normal_angle > 0 && max_normal_angle <= 180))
     return "max_normal_angle = " + std::to_string(max_normal_angle) + ", want (0, 180]";
   if (!(landmark_weight >= 0) || !std::isfinite(landmark_weight))
     return "landmark_weight = " + std::to_string(landmark_weight) + ", want >= 0";
-  if (auto problem = positive("pose_deviation", pose_deviation)) return problem;
-  if (auto problem = positive("observations", observations)) return problem;
-  return positive("tolerance", tolerance);
+  if (auto problem = unlessPositive("pose_deviation", pose_deviation)) return problem;
+  if (auto problem = unlessPositive("observations", observations)) return problem;
+  return unlessPositive("tolerance", tolerance);
 }
 
 Solved<ModelFit> fitModelToScan(const ScanSurface& scan, const BodyModel& model, const BodyState& start,

@@ -28,7 +28,7 @@ struct ModelFitOptions {
                                        {20000, 0.05, 0.015, 0.005, true, 6}};
   double max_normal_angle = 60;  ///< gate, degrees, (0, 180]
   bool reject_boundary = true;   ///< gate
-  double pose_deviation = 0.2;   ///< BodyFitOptions
+  double pose_deviation = 0.2;   ///< BodyFitOptions; for scans near the rest pose, people in motion want about 1
   double observations = 1000;    ///< BodyFitOptions
   double landmark_weight = 1;    ///< of all landmarks together, relative to one side of the scan, >= 0
   double tolerance = 1e-4;       ///< of a round: root mean square motion of the model's vertices, m, > 0

@@ -98,6 +98,10 @@ TEST_CASE("estimating under clothing refuses what it cannot read, and stops when
   options.refined.cloth = -1;
   CHECK_THROWS_WITH(estimateUnderClothing(tube.scans, tube.model, {}, options),
                     Catch::Contains("refined holds a weight"));
+  options = {};
+  options.retries = 0;  // a frame that was not fitted alone would have no posture
+  CHECK_THROWS_WITH(estimateUnderClothing(tube.scans, tube.model, {}, options),
+                    Catch::Contains("retries = 0, want >= 1"));
   std::stop_source source;
   source.request_stop();
   options = {};
