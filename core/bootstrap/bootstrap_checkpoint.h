@@ -22,13 +22,15 @@ struct FittedScan {
 /// Registrations of the round under way are kept as identity and pose, out of which the surfaces of those that join are
 /// made again; the round's model and its training pairs are made again too.
 struct BootstrapCheckpoint {
-  std::string training;                            ///< fingerprint of inputs and options, in the caller's words
-  std::vector<BootstrapRound> rounds;              ///< that have ended
-  std::vector<Vertices> joined;                    ///< X' at rest of the scans that joined, in their order
-  int trainings = 0;                               ///< fields that were trained
-  std::vector<std::optional<BodyState>> examples;  ///< fits of the field's scans by the present model; empty before
-  std::optional<JacobianFieldWeights> field;       ///< of the present model, once trained
-  std::vector<FittedScan> scans;                   ///< done in the round under way, ascending
+  std::string training;                ///< fingerprint of inputs and options, in the caller's words
+  std::vector<BootstrapRound> rounds;  ///< that have ended
+  std::vector<Vertices> joined;        ///< X' at rest of the scans that joined, in their order
+  int trainings = 0;                   ///< fields that were trained
+  /// Fits of the field's scans by the present model, as many as there are examples or none; without numbers where the
+  /// fit failed or is doubtful.
+  std::vector<std::optional<BodyState>> examples;
+  std::optional<JacobianFieldWeights> field;  ///< of the present model, once trained
+  std::vector<FittedScan> scans;              ///< done in the round under way, ascending
 
   /// For people: "round 2, registering, 17 scans done".
   std::string stage() const;

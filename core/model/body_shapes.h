@@ -20,7 +20,7 @@ class BodyShapes final : public ShapeModel {
   const BodyTrainingRecord& training() const { return training_; }
   bool hasField() const { return field_.has_value(); }
   /// What registerScan deforms this model's fits with. Made when first asked for, which takes about a second for each
-  /// 10,000 vertices. Null without a field, or once the stop token has fired.
+  /// 10,000 vertices; warm() and bytes() ask. Null without a field, or once the stop token has fired.
   std::shared_ptr<const FieldDeformation> field(const std::stop_token& stop = {}) const;
 
   std::string kind() const override { return kBodyKind; }

@@ -30,7 +30,6 @@ Scan scanAtRest(const BodyModel& model, const BodyState& state, const ScanSurfac
 /// A body's surface as a field sees it on a scan.
 struct DeformedBody {
   Vertices rest;   ///< X' of [Mur25] Algorithm 2, V x 3, in the model's rest pose
-  Pose pose;       ///< that puts it on the scan
   Vertices posed;  ///< V x 3, in the scan's place
 };
 
@@ -44,9 +43,9 @@ class FieldDeformation {
                                                       const std::stop_token& stop = {});
   FieldDeformation(std::shared_ptr<const FieldReference> reference, JacobianFieldWeights weights);
 
-  /// X_o = model.rest(state.identity) deformed as the field says of it and of scanAtRest(), then posed about its own
-  /// joints. A field says nothing of places: at rest each component stays centred where it is in X_o, and in the pose
-  /// the root bone carries space as it did with X_o (the translation makes up for the root joint's new place).
+  /// X_o = model.rest(state.identity) deformed as the field says of it and of scanAtRest(). A field says nothing of
+  /// places: at rest each component stays centred where it is in X_o. Then the bones of the fit carry it as they carry
+  /// X_o: about X_o's joints, so that what the field brought onto the scan at rest comes to lie on the scan.
   ///
   /// Nothing when fewer than kFewestScanPoints points of the scan come to rest. Throws InvalidInput naming `model` when
   /// its topology is not the field's reference's, or `state`.
