@@ -33,7 +33,9 @@ void doubt(const RoundScans& scans, const Solved<ScanRegistration>& solved, Boot
   if (!solved.converged() && solved.termination != Termination::kIterationLimit)
     return refuse(ScanVerdict::kFailed, "the fit of the model ended as " + std::string(name(solved.termination)),
                   report);
-  if (!field) return refuse(ScanVerdict::kFailed, "next to no point of the scan lies on the fitted model", report);
+  if (!field)
+    return refuse(ScanVerdict::kFailed,
+                  "next to no point of the scan lies on the fitted model, or the field overflows on it", report);
   if (const auto fault = faultOf(*scans.model.topology(), scans.at_rest ? field->rest : vertices))
     return refuse(ScanVerdict::kFailed, "the field made no shape of it: " + *fault, report);
   if (report.score < scans.registration.least_score)
