@@ -10,6 +10,7 @@
 #include "core/bootstrap/round_scans.h"
 #include "core/numerics/error.h"
 #include "core/registration/scan_checks.h"
+#include "core/surface/laplacian.h"
 
 namespace shaped {
 namespace {
@@ -26,13 +27,20 @@ void requireInputs(const BootstrapInputs& inputs, const FieldTrainer& train, con
   if (!inputs.scans.load || !inputs.scans.name) throw InvalidInput("scans", "have no function that loads or names one");
 }
 
-void requireSameKind(const BootstrapCheckpoint& checkpoint, const BootstrapInputs& inputs) {
+void requireSameKind(const BootstrapCheckpoint& checkpoint, const BootstrapInputs& inputs,
+                     const BootstrapOptions& options) {
   const auto examples = checkpoint.examples.size();
-  bool fits = examples == 0 || examples == inputs.examples.size();
+  bool fits = examples == 0 || examples == exampleScans(inputs, options);
   for (const auto& scan : checkpoint.scans) fits = fits && scan.report.scan < inputs.scans.count;
   for (const auto& shape : checkpoint.joined) fits = fits && shape.rows() == inputs.reference.rest.rows();
   if (!fits) throw InvalidInput("checkpoint", "is of other inputs; begin anew");
 }
+
+/// What the fit of a scan of R_DEFORM leaves.
+struct TaughtResidual {
+  std::size_t scan;  ///< of FieldExamples
+  ResidualExample residual;
+};
 
 /// A run of Algorithm 2 from a checkpoint on.
 class Bootstrap {
@@ -47,7 +55,7 @@ class Bootstrap {
         state_(std::move(state)),
         registrations_(inputs.registrations) {
     registrations_.insert(registrations_.end(), state_.joined.begin(), state_.joined.end());
-    state_.examples.resize(inputs.examples.size());
+    state_.examples.resize(examples_.count());
   }
 
   std::optional<Bootstrapped> run() {
@@ -94,7 +102,10 @@ class Bootstrap {
 
   bool learnField(const BodyModel& model) {
     if (!fitExamples(model)) return false;
-    FieldTrainingSet set{state_.trainings + 1, referenceOf(model), {}, pairsOf(model)};
+    const auto residuals = residualsOf(model);
+    if (stopped()) return false;
+    auto regression = regressionOf(model, residuals);
+    FieldTrainingSet set{state_.trainings + 1, referenceOf(model), {}, pairsOf(model, residuals, regression.held_out)};
     if (!set.reference || stopped()) return false;
     if (set.pairs.empty())
       throw InvalidInput("examples",
@@ -105,6 +116,7 @@ class Bootstrap {
     auto field = train_(set, watch_.stop);
     if (!field) return false;
     const JacobianField complete(*field);  // says what does not fit
+    field->regression = std::move(regression.weights);
     note([&] {
       state_.field = std::move(field);
       ++state_.trainings;
@@ -113,7 +125,7 @@ class Bootstrap {
   }
 
   bool fitExamples(const BodyModel& model) {
-    forAll(inputs_.examples.size(), [&](std::size_t i) {
+    forAll(examples_.count(), [&](std::size_t i) {
       if (state_.examples[i]) return;
       auto fitted = examples_.fit(i, model, watch_.stop);
       if (!fitted) return;
@@ -121,21 +133,40 @@ class Bootstrap {
         state_.examples[i] = std::move(fitted);
         const auto done = std::count_if(state_.examples.begin(), state_.examples.end(),
                                         [](const auto& example) { return example.has_value(); });
-        tellOf("fitting the field's scans, ", done, inputs_.examples.size(), 0, kFieldBegins);
+        tellOf("fitting the field's scans, ", done, examples_.count(), 0, kFieldBegins);
       });
     });
     return !stopped();
   }
 
-  /// Those that were fitted, in the examples' order.
-  std::vector<RestPair> pairsOf(const BodyModel& model) const {
-    std::vector<std::optional<RestPair>> pairs(inputs_.examples.size());
-    forAll(pairs.size(), [&](std::size_t i) {
-      if (taught(i)) pairs[i] = examples_.pair(i, model, *state_.examples[i]);
+  /// Of the scans that were fitted and show enough, in their order.
+  std::vector<TaughtResidual> residualsOf(const BodyModel& model) const {
+    std::vector<std::optional<ResidualExample>> found(examples_.count());
+    forAll(found.size(), [&](std::size_t i) {
+      if (taught(i)) found[i] = examples_.residual(i, model, *state_.examples[i]);
+    });
+    std::vector<TaughtResidual> residuals;
+    for (std::size_t i = 0; i < found.size(); ++i)
+      if (found[i]) residuals.push_back({i, std::move(*found[i])});
+    return residuals;
+  }
+
+  FittedResiduals regressionOf(const BodyModel& model, const std::vector<TaughtResidual>& residuals) const {
+    std::vector<ResidualExample> examples;
+    for (const auto& taught : residuals) examples.push_back(taught.residual);
+    return fitResiduals(examples, lumpedAreas(model.parts().mean, model.topology()->faces()));
+  }
+
+  std::vector<RestPair> pairsOf(const BodyModel& model, const std::vector<TaughtResidual>& residuals,
+                                const std::vector<Vertices>& predicted) const {
+    std::vector<std::optional<RestPair>> pairs(residuals.size());
+    forAll(pairs.size(), [&](std::size_t k) {
+      const auto& [i, residual] = residuals[k];
+      pairs[k] = examples_.pair(i, model, *state_.examples[i], residual, predicted[k]);
     });
     std::vector<RestPair> usable;
     for (auto& pair : pairs)
-      if (pair && pair->scan.points.rows() >= kFewestScanPoints) usable.push_back(std::move(*pair));
+      if (pair) usable.push_back(std::move(*pair));
     return usable;
   }
 
@@ -157,7 +188,7 @@ class Bootstrap {
     const auto reference = referenceOf(model);
     if (!reference) return false;
     registration.field = std::make_shared<const FieldDeformation>(reference, *state_.field);
-    const RoundScans scans{inputs_.scans, model, registration, options_.posture == PostureNormalisation::kNone};
+    const RoundScans scans{inputs_.scans, model, registration};
     return registerScans(scans) && endRound(scans);
   }
 
@@ -191,7 +222,7 @@ class Bootstrap {
     BootstrapRound round;
     round.round = roundNumber();
     round.registrations = registrations_.size();
-    for (std::size_t i = 0; i < inputs_.examples.size(); ++i) round.examples += taught(i);
+    for (std::size_t i = 0; i < examples_.count(); ++i) round.examples += taught(i);
     for (const auto& fitted : state_.scans) round.scans.push_back(fitted.report);
     judge(options_.acceptance, round);
     std::vector<const FittedScan*> joining;
@@ -273,7 +304,7 @@ std::optional<Bootstrapped> bootstrapBody(const BootstrapInputs& inputs, const F
                                           const BootstrapOptions& options, const BootstrapWatch& watch,
                                           std::optional<BootstrapCheckpoint> resumed) {
   requireInputs(inputs, train, options);
-  if (resumed) requireSameKind(*resumed, inputs);
+  if (resumed) requireSameKind(*resumed, inputs, options);
   return Bootstrap(inputs, train, options, watch, resumed ? std::move(*resumed) : BootstrapCheckpoint{}).run();
 }
 

@@ -18,7 +18,7 @@ namespace shaped {
 /// A registration that teaches the field, with a scan of the same body.
 struct FieldExample {
   Vertices registration;     ///< V x 3, m: where the scan stands, or in any posture and place
-  std::optional<Scan> scan;  ///< none: the virtual scanner makes one of the registration as it is
+  std::optional<Scan> scan;  ///< none: the virtual scanner makes some of it, in postures near rest
 };
 
 /// Raw scans that are loaded when it is their turn, so that they need not all be in memory.
@@ -65,14 +65,10 @@ struct Bootstrapped {
 /// joins. It ends when fewer than least_joined join, no scan is left, or the rounds are done; model and field are then
 /// learned once more from what there is.
 ///
-/// The surfaces that join do so as they lie on their scans, and learning takes their posture out as it does that of all
-/// registrations; with PostureNormalisation::kNone they join at rest, as in the paper. Ours, since what the fit's pose
-/// leaves in the surface at rest is not the body's: limbs of a small model's fit turn about themselves to make up for
-/// what its identities lack, and at rest the surface shows that.
-///
-/// Targets of the field: of the registration carried back by the fit's pose, as its scan is, and the registration with
-/// its posture normalised and rigidly aligned to X_o, the one that the scan at rest lies nearer to. The first is exact
-/// where the registration stands where its scan does; the second serves where it does not.
+/// Ours, too: what the model's fits leave of R_DEFORM is learned by a ridge regression first (fitResiduals), and the
+/// field what that leaves, from predictions for each body by a regression without it. The targets are the registrations
+/// at rest (posture normalised, rigidly aligned to X_o), and X' joins at rest, as in the paper: limbs of a small
+/// model's fit turn to make up for what its identities lack, and the target at rest does not.
 ///
 /// resumed: a checkpoint of the same inputs and options, whose fingerprint the caller has compared; each_scan and
 /// each_round do not tell again what it holds. The result has the same bits with or without interruptions, whatever the

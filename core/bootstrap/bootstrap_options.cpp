@@ -15,6 +15,9 @@ std::optional<std::string> BootstrapOptions::firstViolation() const {
   if (auto problem = atLeast("modes", modes, 1)) return problem;
   if (auto problem = atLeast("least_joined", least_joined, 1)) return problem;
   if (auto problem = atLeast("sample", sample, 0)) return problem;
+  if (auto problem = atLeast("virtual_scans", virtual_scans, 1)) return problem;
+  if (!(virtual_turns >= 0) || !std::isfinite(virtual_turns))
+    return "virtual_turns = " + std::to_string(virtual_turns) + ", want >= 0";
   if (!(acceptance >= 0) || !std::isfinite(acceptance))
     return "acceptance = " + std::to_string(acceptance) + ", want >= 0";
   if (auto problem = unlessPositive("reach", reach)) return problem;

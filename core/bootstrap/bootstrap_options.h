@@ -19,8 +19,10 @@ struct BootstrapOptions {
   PostureNormalisation posture = PostureNormalisation::kSkeleton;
   double reach = 0.1;                    ///< of PostureNormalisation::kLocal, m, > 0
   ScanRegistrationOptions registration;  ///< its field, stop and `refine` are not looked at
-  VirtualScannerOptions scanner;         ///< of registrations without a scan; its seed is not looked at
-  std::uint64_t seed = 1;                ///< of virtual scans and samples
+  int virtual_scans = 2;        ///< of each registration of R_DEFORM without a scan, each in a posture of its own, >= 1
+  double virtual_turns = 0.06;  ///< standard deviation of the joints' axis-angle components in these, rad, >= 0
+  VirtualScannerOptions scanner;  ///< of those; its seed is not looked at
+  std::uint64_t seed = 1;         ///< of virtual scans and samples
 
   std::optional<std::string> firstViolation() const;  ///< "rounds = 0, want >= 1"
 };

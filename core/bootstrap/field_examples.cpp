@@ -2,30 +2,24 @@
 
 #include "core/mesh/alignment.h"
 #include "core/numerics/error.h"
+#include "core/registration/fit_evidence.h"
+#include "core/registration/pose_refit.h"
 #include "core/registration/scan_checks.h"
 #include "core/sample/random.h"
+#include "core/skeleton/skinning.h"
 
 namespace shaped {
 namespace {
 
 std::string fieldOf(std::size_t i, const char* part) { return "examples[" + std::to_string(i) + "]." + part; }
 
-/// Mean distance of a scan to a shape at rest, m.
-double distanceTo(const Vertices& shape, const Faces& faces, const Scan& scan) {
-  return distancesToSurface(scan.points, shape, faces).mean();
-}
-
-/// The registration carried back by the pose; nothing where the pose leaves a vertex no way back.
-std::optional<Vertices> carriedBack(const BodyModel& model, const BodyState& state, const Vertices& registration) {
-  try {
-    return unskinned(model.skeleton(), model.parts().weights, registration, model.restJoints(state.identity),
-                     state.pose);
-  } catch (const InvalidInput&) {
-    return std::nullopt;
-  }
-}
-
 }  // namespace
+
+std::size_t exampleScans(const BootstrapInputs& inputs, const BootstrapOptions& options) {
+  std::size_t count = 0;
+  for (const auto& example : inputs.examples) count += example.scan ? 1 : std::size_t(options.virtual_scans);
+  return count;
+}
 
 FieldExamples::FieldExamples(const BootstrapInputs& inputs, const BootstrapOptions& options)
     : inputs_(inputs), options_(options) {
@@ -34,19 +28,34 @@ FieldExamples::FieldExamples(const BootstrapInputs& inputs, const BootstrapOptio
     const auto& [registration, scan] = inputs.examples[i];
     requireValidShape(*inputs.reference.topology, registration, fieldOf(i, "registration"));
     if (scan) requireUsableScan(*scan, fieldOf(i, "scan"));
+    for (std::size_t number = 0; number < (scan ? 1 : std::size_t(options.virtual_scans)); ++number)
+      scans_.push_back({i, number});
   }
 }
 
-FieldExamples::Scanned FieldExamples::scanned(std::size_t i) const {
-  const auto& [registration, scan] = inputs_.examples[i];
-  if (scan) return {preparedScan(*scan, options_.registration.unit_factor), registration};
+/// The registration in a posture near rest.
+Vertices FieldExamples::posed(std::size_t example, std::uint64_t seed) const {
+  const auto& reference = inputs_.reference;
+  const Vertices rest =
+      normalisedPosture(reference, inputs_.examples[example].registration, options_.posture, options_.reach);
+  Random random(seed);
+  Pose pose = restPose(reference.rig.skeleton);
+  for (Eigen::Index joint = 1; joint < pose.rotations.rows(); ++joint)
+    for (int axis = 0; axis < 3; ++axis) pose.rotations(joint, axis) = options_.virtual_turns * random.normal();
+  return PosedSkin(reference.rig.skeleton, reference.rig.weights, rest, reference.regressor * rest, pose).vertices();
+}
+
+Scan FieldExamples::scanned(std::size_t i) const {
+  const auto [example, number] = scans_[i];
+  if (const auto& scan = inputs_.examples[example].scan) return preparedScan(*scan, options_.registration.unit_factor);
+  Random random(options_.seed + i);
   auto scanner = options_.scanner;
-  scanner.seed = Random(options_.seed + i).bits();
+  scanner.seed = random.bits();
   try {
-    const auto made = scanVirtually(registration, inputs_.reference.topology->faces(), scanner);
-    return {preparedScan(made.scan, 1), apply(made.motion, registration)};
+    return preparedScan(scanVirtually(posed(example, random.bits()), inputs_.reference.topology->faces(), scanner).scan,
+                        1);
   } catch (const InvalidInput& problem) {
-    throw InvalidInput(fieldOf(i, "registration"), std::string("cannot be scanned: ") + problem.what());
+    throw InvalidInput(fieldOf(example, "registration"), std::string("cannot be scanned: ") + problem.what());
   }
 }
 
@@ -56,22 +65,32 @@ std::optional<BodyState> FieldExamples::fit(std::size_t i, const BodyModel& mode
   registration.refine = false;
   registration.stop = stop;
   registration.unit_factor = 1;  // scanned() is in metres
-  const auto fitted = registerScan(scanned(i).scan, model, {}, registration);
+  const auto fitted = registerScan(scanned(i), model, {}, registration);
   if (stop.stop_requested()) return std::nullopt;
   const bool usable = fitted.converged() || fitted.termination == Termination::kIterationLimit;
   if (!usable || fitted.solution.score < registration.least_score) return BodyState{};
   return fitted.solution.state;
 }
 
-RestPair FieldExamples::pair(std::size_t i, const BodyModel& model, const BodyState& state) const {
-  const auto [scan, registration] = scanned(i);
-  const auto& faces = model.topology()->faces();
-  RestPair pair{model.rest(state.identity), {}, scanAtRest(model, state, ScanSurface(scan))};
-  const Vertices normalised = normalisedPosture(inputs_.reference, registration, options_.posture, options_.reach);
-  pair.target = apply(alignRigidly(normalised, pair.source), normalised);
-  const auto carried = carriedBack(model, state, registration);
-  if (carried && distanceTo(*carried, faces, pair.scan) <= distanceTo(pair.target, faces, pair.scan))
-    pair.target = *carried;
+std::optional<ResidualExample> FieldExamples::residual(std::size_t i, const BodyModel& model,
+                                                       const BodyState& state) const {
+  const auto example = scans_[i].example;
+  const Scan seen = scanAtRest(model, state, ScanSurface(scanned(i)));
+  if (seen.points.rows() < kFewestScanPoints) return std::nullopt;
+  const Vertices fitted = model.rest(state.identity);
+  const Vertices normalised =
+      normalisedPosture(inputs_.reference, inputs_.examples[example].registration, options_.posture, options_.reach);
+  const Vertices target = apply(alignRigidly(normalised, fitted), normalised);
+  return ResidualExample{evidenceOf(state, fitted, model.topology()->faces(), seen), target - fitted, example};
+}
+
+std::optional<RestPair> FieldExamples::pair(std::size_t i, const BodyModel& model, const BodyState& state,
+                                            const ResidualExample& residual, const Vertices& predicted) const {
+  const Vertices fitted = model.rest(state.identity);
+  const ScanSurface scan(scanned(i));
+  const auto start = refitPose(model, fitted + predicted, state.pose, scan, options_.registration.fit);
+  RestPair pair{fitted + predicted, fitted + residual.residual, scanAtRest(start.body, start.state, scan)};
+  if (pair.scan.points.rows() < kFewestScanPoints) return std::nullopt;
   return pair;
 }
 

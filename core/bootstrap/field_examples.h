@@ -6,28 +6,42 @@
 
 namespace shaped {
 
-/// The registrations that teach the field, with their scans.
+/// The registrations that teach the field, with their scans: one each where it is given, else
+/// BootstrapOptions::virtual_scans of them.
 class FieldExamples {
  public:
   /// All must outlive it. Throws InvalidInput naming `examples`, or the registration or scan that is no good.
   FieldExamples(const BootstrapInputs& inputs, const BootstrapOptions& options);
 
-  /// Fits a model to the scan of example i. Nothing once the stop token has fired; a state without numbers where the
-  /// fit failed or scores below what is trusted.
+  /// Scans of all registrations.
+  std::size_t count() const { return scans_.size(); }
+
+  /// Fits a model to scan i. Nothing once the stop token has fired; a state without numbers where the fit failed or
+  /// scores below what is trusted.
   std::optional<BodyState> fit(std::size_t i, const BodyModel& model, const std::stop_token& stop) const;
-  /// What the field is to learn of it (bootstrapBody says how the target comes about).
-  RestPair pair(std::size_t i, const BodyModel& model, const BodyState& state) const;
+
+  /// What the fit of scan i leaves of the registration, which is brought to rest and to where X_o lies. Nothing where
+  /// too little of the scan comes to rest.
+  std::optional<ResidualExample> residual(std::size_t i, const BodyModel& model, const BodyState& state) const;
+  /// What the field is to learn of scan i where the regression predicts `predicted` of that residual. Nothing as above.
+  std::optional<RestPair> pair(std::size_t i, const BodyModel& model, const BodyState& state,
+                               const ResidualExample& residual, const Vertices& predicted) const;
 
  private:
-  /// A scan, made ready, and the registration: of a virtual scan where that stands, else as it was given.
-  struct Scanned {
-    Scan scan;
-    Vertices registration;
+  Scan scanned(std::size_t i) const;
+  Vertices posed(std::size_t example, std::uint64_t seed) const;
+
+  /// Which registration a scan is of, and the number of its virtual scan.
+  struct Source {
+    std::size_t example, number;
   };
-  Scanned scanned(std::size_t i) const;
 
   const BootstrapInputs& inputs_;
   const BootstrapOptions& options_;
+  std::vector<Source> scans_;
 };
+
+/// Scans of all registrations, as FieldExamples::count().
+std::size_t exampleScans(const BootstrapInputs& inputs, const BootstrapOptions& options);
 
 }  // namespace shaped

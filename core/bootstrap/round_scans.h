@@ -12,7 +12,6 @@ struct RoundScans {
   const ScanSource& scans;
   const BodyModel& model;
   ScanRegistrationOptions registration;  ///< with the field and the stop token
-  bool at_rest;                          ///< whether surfaces are learned from at rest, or as they lie on their scans
 
   /// Registers a scan and says how that went. Nothing once the stop token has fired.
   std::optional<FittedScan> fit(std::size_t scan, int round) const;

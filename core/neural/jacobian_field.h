@@ -1,9 +1,11 @@
 #pragma once
 
+#include <optional>
 #include <vector>
 
 #include "core/neural/dense_layers.h"
 #include "core/neural/jacobian_field_features.h"
+#include "core/neural/residual_regression.h"
 
 namespace shaped {
 
@@ -20,6 +22,9 @@ struct JacobianFieldWeights {
   /// features hold the first two only as differences of numbers that agree to a hundredth, and the last not at all, as
   /// no triangle sees its neighbours.
   bool offsets = false;
+  /// Our addition: what a fit goes through before the field sees it, for whoever applies a field to fits. The field
+  /// itself leaves it alone; it is of one topology.
+  std::optional<ResidualRegressionWeights> regression = std::nullopt;
 
   /// Inputs that a triangle has of its own; those of the whole shape and scan come after.
   Eigen::Index localInputs() const;

@@ -22,6 +22,18 @@ std::vector<Linear> readNet(const TensorFile& file, const std::string& net) {
   return layers;
 }
 
+void addRegression(const std::string& name, const ResidualRegressionWeights& weights, TensorWriter& file) {
+  file.addMatrix(name + ".offset_weights", weights.offset_weights);
+  file.addMatrix(name + ".state_weights", weights.state_weights);
+  file.addMatrix(name + ".mean", weights.mean.transpose());
+  file.addMatrix(name + ".modes", weights.modes);
+}
+
+ResidualRegressionWeights readRegression(const TensorFile& file, const std::string& name) {
+  return {file.matrix<float>(name + ".offset_weights"), file.matrix<float>(name + ".state_weights"),
+          file.matrix<float>(name + ".mean", 1).transpose(), file.matrix<float>(name + ".modes")};
+}
+
 }  // namespace
 
 void addJacobianField(const std::string& name, const JacobianFieldWeights& weights, TensorWriter& file) {
@@ -34,6 +46,7 @@ void addJacobianField(const std::string& name, const JacobianFieldWeights& weigh
   addNet(name + ".source_net", weights.source_net, file);
   addNet(name + ".scan_net", weights.scan_net, file);
   addNet(name + ".mlp", weights.mlp, file);
+  if (weights.regression) addRegression(name + ".regression", *weights.regression, file);
 }
 
 JacobianFieldWeights readJacobianField(const TensorFile& file, const std::string& name) {
@@ -46,6 +59,7 @@ JacobianFieldWeights readJacobianField(const TensorFile& file, const std::string
   weights.source_net = readNet(file, name + ".source_net");
   weights.scan_net = readNet(file, name + ".scan_net");
   weights.mlp = readNet(file, name + ".mlp");
+  if (file.has(name + ".regression.mean")) weights.regression = readRegression(file, name + ".regression");
   return weights;
 }
 

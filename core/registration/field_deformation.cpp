@@ -10,6 +10,8 @@
 #include "core/mesh/quality.h"
 #include "core/numerics/error.h"
 #include "core/numerics/option_checks.h"
+#include "core/registration/fit_evidence.h"
+#include "core/registration/pose_refit.h"
 #include "core/registration/scan_checks.h"
 
 namespace shaped {
@@ -109,22 +111,41 @@ std::shared_ptr<const FieldDeformation> FieldDeformation::make(const BodyModel& 
 }
 
 FieldDeformation::FieldDeformation(std::shared_ptr<const FieldReference> reference, JacobianFieldWeights weights)
-    : reference_(std::move(reference)), field_(std::move(weights)) {}
+    : reference_(std::move(reference)), field_(std::move(weights)) {
+  if (const auto& regression = field_.weights().regression) regression_.emplace(*regression);
+}
 
 std::optional<DeformedBody> FieldDeformation::deform(const BodyModel& model, const BodyState& state,
-                                                     const ScanSurface& scan) const {
-  const auto& poisson = *reference_->poisson;
-  if (model.topology()->id() != poisson.topology().id())
+                                                     const ScanSurface& scan, const ModelFitOptions& fit) const {
+  if (model.topology()->id() != reference_->poisson->topology().id())
     throw InvalidInput("model", "is of another topology than the field's reference: make the field's of this model");
-  const Scan seen = scanAtRest(model, state, scan);
+  Scan seen = scanAtRest(model, state, scan);
   if (seen.points.rows() < kFewestScanPoints) return std::nullopt;
+  std::optional<Vertices> rest;
+  Pose pose = state.pose;
+  if (regression_) {
+    const Vertices fitted = model.rest(state.identity);
+    const auto residual = regression_->predict(evidenceOf(state, fitted, model.topology()->faces(), seen));
+    const auto start = refitPose(model, fitted + residual, state.pose, scan, fit);
+    pose = start.state.pose;
+    seen = scanAtRest(start.body, start.state, scan);
+    if (seen.points.rows() < kFewestScanPoints) return std::nullopt;
+    rest = deformed(start.body, start.state, seen);
+  } else {
+    rest = deformed(model, state, seen);
+  }
+  if (!rest) return std::nullopt;
+  const auto body = refitPose(model, *rest, pose, scan, fit);
+  return DeformedBody{std::move(*rest), body.state.pose, body.posed()};
+}
+
+/// The field alone; nothing where it overflows.
+std::optional<Vertices> FieldDeformation::deformed(const BodyModel& model, const BodyState& state,
+                                                   const Scan& seen) const {
   const auto features = jacobianFieldFeatures(*reference_, model.rest(state.identity), seen, field_.weights().scaling);
   const auto jacobians = field_.predict(features);
   if (!jacobians.allFinite()) return std::nullopt;
-  Vertices rest = poisson.solve(jacobians, features.centroids);
-  Vertices posed =
-      PosedSkin(model.skeleton(), model.parts().weights, rest, model.restJoints(state.identity), state.pose).vertices();
-  return DeformedBody{std::move(rest), std::move(posed)};
+  return reference_->poisson->solve(jacobians, features.centroids);
 }
 
 std::size_t FieldDeformation::bytes() const {
@@ -132,7 +153,8 @@ std::size_t FieldDeformation::bytes() const {
   Eigen::Index numbers = reference_->signatures.size();
   for (const auto* net : {&weights.source_net, &weights.scan_net, &weights.mlp})
     for (const auto& layer : *net) numbers += layer.weight.size() + layer.bias.size();
-  return reference_->poisson->bytes() + sizeof(double) * static_cast<std::size_t>(reference_->shape.size()) +
+  return reference_->poisson->bytes() + (regression_ ? regression_->bytes() : 0) +
+         sizeof(double) * static_cast<std::size_t>(reference_->shape.size()) +
          sizeof(float) * static_cast<std::size_t>(numbers);
 }
 

@@ -7,6 +7,7 @@
 #include "core/body/body_model.h"
 #include "core/neural/jacobian_field.h"
 #include "core/registration/scan_surface.h"
+#include "core/registration/scan_to_model.h"
 
 namespace shaped {
 
@@ -30,6 +31,7 @@ Scan scanAtRest(const BodyModel& model, const BodyState& state, const ScanSurfac
 /// A body's surface as a field sees it on a scan.
 struct DeformedBody {
   Vertices rest;   ///< X' of [Mur25] Algorithm 2, V x 3, in the model's rest pose
+  Pose pose;       ///< of X' on the scan
   Vertices posed;  ///< V x 3, in the scan's place
 };
 
@@ -43,22 +45,27 @@ class FieldDeformation {
                                                       const std::stop_token& stop = {});
   FieldDeformation(std::shared_ptr<const FieldReference> reference, JacobianFieldWeights weights);
 
-  /// X_o = model.rest(state.identity) deformed as the field says of it and of scanAtRest(). A field says nothing of
-  /// places: at rest each component stays centred where it is in X_o. Then the bones of the fit carry it as they carry
-  /// X_o: about X_o's joints, so that what the field brought onto the scan at rest comes to lie on the scan.
+  /// X_o = model.rest(state.identity) deformed to X'. Where the field comes with a regression, that goes first: it adds
+  /// to X_o what it makes of the fit's evidence, and the pose is fitted anew. Then the field, of what scanAtRest() then
+  /// shows. It says nothing of places: at rest each component stays centred where it was. At last the pose of X' is
+  /// fitted to the scan (refitPose), as that of X_o has made up for what X_o lacked. fit: how.
   ///
   /// Nothing when fewer than kFewestScanPoints points of the scan come to rest, or the field's single precision
   /// overflows on what it sees. Throws InvalidInput naming `model` when its topology is not the field's reference's, or
   /// `state`.
-  std::optional<DeformedBody> deform(const BodyModel& model, const BodyState& state, const ScanSurface& scan) const;
+  std::optional<DeformedBody> deform(const BodyModel& model, const BodyState& state, const ScanSurface& scan,
+                                     const ModelFitOptions& fit = {}) const;
 
   const JacobianFieldWeights& weights() const { return field_.weights(); }
   /// Memory of reference and field, about.
   std::size_t bytes() const;
 
  private:
+  std::optional<Vertices> deformed(const BodyModel& model, const BodyState& state, const Scan& seen) const;
+
   std::shared_ptr<const FieldReference> reference_;
   JacobianField field_;
+  std::optional<ResidualRegression> regression_;
 };
 
 }  // namespace shaped

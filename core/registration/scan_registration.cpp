@@ -93,10 +93,12 @@ void addWarnings(const ScanRegistrationOptions& options, const Outcome& outcome,
 
 void deformByField(const ScanSurface& surface, const BodyModel& model, const ScanRegistrationOptions& options,
                    ScanRegistration& result) {
-  auto deformed = options.field->deform(model, result.state, surface);
+  auto fit = options.fit;
+  fit.stop = options.stop;
+  auto deformed = options.field->deform(model, result.state, surface, fit);
   if (!deformed) return;
   const auto report = ModelPairs(surface, model, options.fit).report(deformed->posed, options.fit.levels.back());
-  result.field = FieldRegistration{std::move(deformed->rest), report};
+  result.field = FieldRegistration{std::move(deformed->rest), std::move(deformed->pose), report};
   result.vertices = std::move(deformed->posed);
 }
 

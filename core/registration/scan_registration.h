@@ -31,6 +31,7 @@ struct ScanRegistrationOptions {
 /// What a model's field made of its surface.
 struct FieldRegistration {
   Vertices rest;          ///< X', V x 3: the surface in the model's rest pose (FieldDeformation)
+  Pose pose;              ///< of that surface
   ModelFitReport report;  ///< of that surface, as ScanRegistration::report of the model's
 };
 

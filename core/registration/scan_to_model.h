@@ -28,6 +28,7 @@ struct ModelFitOptions {
                                        {20000, 0.05, 0.015, 0.005, true, 6}};
   double max_normal_angle = 60;  ///< gate, degrees, (0, 180]
   bool reject_boundary = true;   ///< gate
+  bool identity = true;          ///< whether the identity may change, or the pose alone
   double pose_deviation = 0.2;   ///< BodyFitOptions; for scans near the rest pose, people in motion want about 1
   double observations = 1000;    ///< BodyFitOptions
   double landmark_weight = 1;    ///< of all landmarks together, relative to one side of the scan, >= 0

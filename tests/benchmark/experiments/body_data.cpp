@@ -2,13 +2,18 @@
 
 #include <algorithm>
 #include <cstdlib>
+#include <nlohmann/json.hpp>
 #include <numbers>
 
+#include "core/io/file.h"
 #include "core/io/frames.h"
 #include "core/io/mesh_file.h"
 #include "core/io/npy.h"
 #include "core/io/rig_file.h"
+#include "core/io/scan_file.h"
+#include "core/mesh/alignment.h"
 #include "core/sample/random.h"
+#include "tests/benchmark/experiments/experiment.h"
 
 namespace shaped::experiments {
 namespace {
@@ -20,6 +25,17 @@ std::filesystem::path rigPath() {
     throw MissingData("no rig at " + path.string() + "; make it by tests/support/rig_from_data.py posed_body " +
                       dataPath("posed_body").string() + " " + path.string());
   return path;
+}
+
+TrueScan trueScan(int index, const nlohmann::json& truth) {
+  const auto& entry = truth.at("scans").at(std::size_t(index));
+  RigidMotion motion;
+  for (int r = 0; r < 3; ++r) {
+    motion.translation[r] = entry.at("t").at(std::size_t(r));
+    for (int c = 0; c < 3; ++c) motion.rotation(r, c) = entry.at("R").at(std::size_t(r)).at(std::size_t(c));
+  }
+  const auto file = text("body_scans/scan_%02d.ply", index), body = text("body_scans/gt/scan_%02d_gt.ply", index);
+  return {readScan(dataPath(file)), apply(motion, readMesh(dataPath(body)).vertices), entry.at("identity")};
 }
 
 }  // namespace
@@ -41,6 +57,23 @@ BodyData bodyData() {
   data.reference = makePostureTemplate(topology, readMesh(dataPath("posed_body/full/template.ply")).vertices,
                                        std::move(data.reference.rig));
   return data;
+}
+
+std::vector<TrueScan> trueScans() {
+  const auto truth = nlohmann::json::parse(readFile(dataPath("body_scans/scans.json")));
+  const char* limit = std::getenv("SHAPED_SCANS");
+  std::vector<TrueScan> scans;
+  for (int i = 0; i < (limit ? std::atoi(limit) : 40); ++i) scans.push_back(trueScan(i, truth));
+  return scans;
+}
+
+BodyModel modelOf(const BodyData& data, std::size_t identities, int modes) {
+  std::vector<Vertices> training;
+  for (std::size_t i = 0; i < identities; ++i) training.push_back(data.rest[data.others[i]]);
+  BodyTrainingOptions options;
+  options.posture = PostureNormalisation::kNone;
+  options.modes = modes;
+  return trainBody(data.reference, training, options)->model;
 }
 
 Vertices slightlyPosed(const PostureTemplate& reference, const Vertices& rest, std::uint64_t seed) {

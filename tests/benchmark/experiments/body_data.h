@@ -3,6 +3,7 @@
 #include <cstdint>
 
 #include "core/body/body_training.h"
+#include "core/mesh/scan.h"
 #include "tests/benchmark/experiments/data.h"
 
 namespace shaped::experiments {
@@ -20,6 +21,19 @@ struct BodyData {
 /// Reads them. The rig file is the one that SHAPED_RIG names (default /tmp/rig/body_full.json), made by
 ///   tests/support/rig_from_data.py posed_body ~/.cache/shaped-data/posed_body /tmp/rig/body_full.json
 BodyData bodyData();
+
+/// A raw scan with what it was made from.
+struct TrueScan {
+  Scan scan;
+  Vertices body;         ///< in the scan's place
+  std::size_t identity;  ///< which body of BodyData::rest it is of
+};
+
+/// The first of the 40 scans of body_scans, as many as SHAPED_SCANS says (default: all).
+std::vector<TrueScan> trueScans();
+
+/// A model of the first of `others`, registered in the canonical pose as in [Mur25].
+BodyModel modelOf(const BodyData& data, std::size_t identities, int modes);
 
 /// A body slightly posed, as those of the data are: every joint that the data turns by a random vector, of 2.5 degrees
 /// a component, arms twice that.

@@ -41,6 +41,8 @@ void denoising();
 void bodyModels();
 /// Row "registration".
 void registration();
+/// Row "bliss"; only where LibTorch is there to train fields.
+void bliss();
 /// Row "clothing".
 void clothing();
 /// Row "robustness".

@@ -1,11 +1,7 @@
 #include <algorithm>
 #include <cstdlib>
 #include <functional>
-#include <nlohmann/json.hpp>
 
-#include "core/io/file.h"
-#include "core/io/mesh_file.h"
-#include "core/io/scan_file.h"
 #include "core/mesh/alignment.h"
 #include "core/mesh/quality.h"
 #include "core/registration/scan_registration.h"
@@ -17,41 +13,6 @@
 
 namespace shaped::experiments {
 namespace {
-
-/// A raw scan of the data with what it was made from.
-struct TrueScan {
-  Scan scan;
-  Vertices body;  ///< in the scan's place
-  std::size_t identity;
-};
-
-TrueScan trueScan(int index, const nlohmann::json& truth) {
-  const auto& entry = truth.at("scans").at(std::size_t(index));
-  RigidMotion motion;
-  for (int r = 0; r < 3; ++r) {
-    motion.translation[r] = entry.at("t").at(std::size_t(r));
-    for (int c = 0; c < 3; ++c) motion.rotation(r, c) = entry.at("R").at(std::size_t(r)).at(std::size_t(c));
-  }
-  const auto file = text("body_scans/scan_%02d.ply", index), body = text("body_scans/gt/scan_%02d_gt.ply", index);
-  return {readScan(dataPath(file)), apply(motion, readMesh(dataPath(body)).vertices), entry.at("identity")};
-}
-
-std::vector<TrueScan> trueScans(int count) {
-  const auto truth = nlohmann::json::parse(readFile(dataPath("body_scans/scans.json")));
-  std::vector<TrueScan> scans;
-  for (int i = 0; i < count; ++i) scans.push_back(trueScan(i, truth));
-  return scans;
-}
-
-/// A model of the first identities, registered in the canonical pose as in [Mur25].
-BodyModel modelOf(const BodyData& data, std::size_t identities, int modes) {
-  std::vector<Vertices> training;
-  for (std::size_t i = 0; i < identities; ++i) training.push_back(data.rest[data.others[i]]);
-  BodyTrainingOptions options;
-  options.posture = PostureNormalisation::kNone;
-  options.modes = modes;
-  return trainBody(data.reference, training, options)->model;
-}
 
 /// What a way of registering comes to over all scans.
 struct Errors {
@@ -150,8 +111,7 @@ void robustness() {
   Report report("Registration under noise, gaps, outliers and any rotation");
   const auto data = bodyData();
   const BodyModel model = modelOf(data, 30, 11);
-  const char* limit = std::getenv("SHAPED_SCANS");
-  auto scans = trueScans(limit ? std::atoi(limit) : 40);
+  auto scans = trueScans();
   // The scanner wants bodies upright.
   for (auto& scan : scans) scan.body = apply(alignRigidly(scan.body, data.reference.rest), scan.body);
   for (const auto& condition : conditions())
@@ -165,8 +125,7 @@ void registration() {
   const OneThread one_thread;
   const auto data = bodyData();
   const BodyModel model = modelOf(data, 30, 11);
-  const char* limit = std::getenv("SHAPED_SCANS");
-  const auto scans = trueScans(limit ? std::atoi(limit) : 40);
+  const auto scans = trueScans();
   tell(report, "model alone",
        errorsOf(model, data, scans, [&](const Scan& scan) { return registerScan(scan, model, {}); }));
   for (const auto& [what, method] : {std::pair{"model and affine fitting", FittingMethod::kAffine},

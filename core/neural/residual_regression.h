@@ -1,12 +1,12 @@
 #pragma once
 
+#include <Eigen/Core>
 #include <cstddef>
 #include <optional>
 #include <string>
 #include <vector>
 
-#include "core/body/body_model.h"
-#include "core/mesh/scan.h"
+#include "core/mesh/types.h"
 
 namespace shaped {
 
@@ -17,11 +17,6 @@ struct FitEvidence {
   /// all about 1. Limbs that turned to make up for what the identities lack stand in ways that tell so.
   Eigen::VectorXd state;
 };
-
-/// rest: the fitted identity at rest, X_o, V x 3. scan: carried to rest by the fit (scanAtRest), with normals. An
-/// offset is the mean over the scan's eight points nearest to the vertex, of those that face its way and lie within a
-/// fiftieth of the bounding box's diagonal.
-FitEvidence evidenceOf(const BodyState& state, const Vertices& rest, const Faces& faces, const Scan& scan);
 
 /// A fit and what it left of the true body.
 struct ResidualExample {

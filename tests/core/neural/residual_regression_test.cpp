@@ -1,4 +1,4 @@
-#include "core/registration/residual_regression.h"
+#include "core/neural/residual_regression.h"
 
 #include <Eigen/Cholesky>
 #include <catch2/catch.hpp>
@@ -46,8 +46,7 @@ double rms(const Vertices& left) { return std::sqrt(left.squaredNorm() / double(
 
 }  // namespace
 
-TEST_CASE("a residual that depends linearly on what is seen is learned for bodies not seen",
-          "[registration][regression]") {
+TEST_CASE("a residual that depends linearly on what is seen is learned for bodies not seen") {
   const auto fitted = fitResiduals(linearExamples(40, 1e-5, 1), evenAreas());
   REQUIRE(fitted.weights);
   CHECK(fitted.after < 0.1 * fitted.before);
@@ -56,7 +55,7 @@ TEST_CASE("a residual that depends linearly on what is seen is learned for bodie
     CHECK(rms(regression.predict(example.evidence) - example.residual) < 0.15 * rms(example.residual));
 }
 
-TEST_CASE("what is held out is what a regression without that body predicts", "[registration][regression]") {
+TEST_CASE("what is held out is what a regression without that body predicts") {
   ResidualRegressionOptions options;
   options.kept = 1;
   const auto examples = linearExamples(6, 1e-4, 3);
@@ -85,7 +84,7 @@ TEST_CASE("what is held out is what a regression without that body predicts", "[
         1e-12);
 }
 
-TEST_CASE("a regression that would not help other bodies is none", "[registration][regression]") {
+TEST_CASE("a regression that would not help other bodies is none") {
   Random random(5);
   std::vector<ResidualExample> examples;
   for (std::size_t i = 0; i < 12; ++i) {
@@ -101,27 +100,7 @@ TEST_CASE("a regression that would not help other bodies is none", "[registratio
   CHECK_FALSE(fitResiduals(linearExamples(2, 1e-5, 1), evenAreas()).weights);
 }
 
-TEST_CASE("offsets are along the normals, of points that face the same way and are near",
-          "[registration][regression]") {
-  // A square in the plane z = 0, twice triangulated, and points above it.
-  Vertices rest(4, 3);
-  rest << 0, 0, 0, 1, 0, 0, 1, 1, 0, 0, 1, 0;
-  Faces faces(2, 3);
-  faces << 0, 1, 2, 0, 2, 3;
-  BodyState state{Eigen::VectorXd::Constant(1, 2.0), {}};
-  state.pose.rotations = Vertices::Zero(2, 3);
-  state.pose.rotations.row(1) << 0.1, 0, -0.2;
-  Scan scan{rest, Vertices::Zero(4, 3), {}};
-  scan.points.col(2).setConstant(0.01);
-  scan.normals.col(2).setConstant(1);
-  scan.normals.row(1) << 0, 0, -1;
-  scan.points.row(2).z() = 0.5;
-  const auto evidence = evidenceOf(state, rest, faces, scan);
-  CHECK(evidence.offsets.isApprox(Eigen::Vector4d(0.01, 0, 0, 0.01)));
-  CHECK(evidence.state.isApprox(Eigen::Vector4d(2, 1, 0, -2)));
-}
-
-TEST_CASE("examples and weights that do not fit are refused by name", "[registration][regression]") {
+TEST_CASE("examples and weights that do not fit are refused by name") {
   auto examples = linearExamples(4, 1e-4, 1);
   examples[3].residual = Vertices::Zero(kVertices + 1, 3);
   CHECK_THROWS_WITH(fitResiduals(examples, evenAreas()), Contains("examples[3]"));

@@ -1,0 +1,21 @@
+#include "core/registration/pose_refit.h"
+
+#include <utility>
+
+namespace shaped {
+
+PosedBody refitPose(const BodyModel& model, const Vertices& rest, const Pose& near, const ScanSurface& scan,
+                    const ModelFitOptions& options) {
+  BodyParts parts = model.parts();
+  parts.modes = parts.modes.leftCols(1).eval();
+  parts.deviations = parts.deviations.head(1).eval();
+  parts.mean = rest;
+  BodyModel body(std::move(parts));
+  ModelFitOptions fit = options;
+  fit.identity = false;
+  while (fit.levels.size() > 2) fit.levels.erase(fit.levels.begin());
+  auto state = fitModelToScan(scan, body, {Eigen::VectorXd::Zero(1), near}, {}, fit).solution.state;
+  return {std::move(body), std::move(state)};
+}
+
+}  // namespace shaped

@@ -1,0 +1,20 @@
+#pragma once
+
+#include "core/registration/scan_to_model.h"
+
+namespace shaped {
+
+/// A single body in a pose.
+struct PosedBody {
+  BodyModel body;   ///< its mean is the body at rest; its one mode is left alone
+  BodyState state;  ///< the identity is zero
+
+  Vertices posed() const { return body.posed(state).vertices(); }
+};
+
+/// A body of the model's rig that stands as it is, in a pose near by: the pose alone is fitted to the scan, by the last
+/// two levels of the options. rest: V x 3, in the model's rest pose. Throws InvalidInput naming what does not fit.
+PosedBody refitPose(const BodyModel& model, const Vertices& rest, const Pose& near, const ScanSurface& scan,
+                    const ModelFitOptions& options);
+
+}  // namespace shaped
