@@ -229,7 +229,7 @@ class Bootstrap {
     for (std::size_t i = 0; i < round.scans.size(); ++i)
       if (round.scans[i].verdict == ScanVerdict::kJoined) joining.push_back(&state_.scans[i]);
     std::vector<Vertices> surfaces(joining.size());
-    forAll(joining.size(), [&](std::size_t i) { surfaces[i] = scans.surface(*joining[i]); });
+    forAll(joining.size(), [&](std::size_t i) { surfaces[i] = scans.restSurface(*joining[i]); });
     if (stopped()) return false;
     note([&] { grow(std::move(round), surfaces); });
     return true;

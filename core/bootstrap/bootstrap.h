@@ -54,7 +54,7 @@ struct Bootstrapped {
   Eigen::VectorXd variances;   ///< of all modes of the last R_PCA, falling [m^2]
   JacobianFieldWeights field;  ///< of the model
   std::vector<BootstrapRound> rounds;
-  std::vector<Vertices> joined;  ///< X' of the scans that joined, in their order, V x 3 (bootstrapBody says where)
+  std::vector<Vertices> joined;  ///< X' at rest, in the order in which they joined, V x 3
   BootstrapEnd end;
 };
 

@@ -66,7 +66,7 @@ std::optional<FittedScan> RoundScans::fit(std::size_t scan, int round) const {
   return fitted;
 }
 
-Vertices RoundScans::surface(const FittedScan& fitted) const {
+Vertices RoundScans::restSurface(const FittedScan& fitted) const {
   const auto scan = scans.load(fitted.report.scan);
   const ScanSurface ready(preparedScan(scan, registration.unit_factor));
   auto deformed = registration.field->deform(model, fitted.state, ready, registration.fit);
