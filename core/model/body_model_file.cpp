@@ -102,10 +102,22 @@ BodyTrainingRecord recordFrom(const nlohmann::json& description, const TensorFil
   return record;
 }
 
-std::optional<JacobianFieldWeights> fieldFrom(const ModelManifest& manifest, const TensorFile& tensors) {
+void requireRegression(const ResidualRegressionWeights& weights, const BodyModel& model) {
+  const ResidualRegression complete(weights);  // says what does not fit
+  const Eigen::Index state = model.modeCount() + 3 * (model.skeleton().jointCount() - 1);
+  if (weights.offset_weights.rows() != model.topology()->vertexCount() || weights.state_weights.rows() != state)
+    throw InvalidInput("field.regression",
+                       "is for " + std::to_string(weights.offset_weights.rows()) + " vertices and " +
+                           std::to_string(weights.state_weights.rows()) + " state coefficients, want " +
+                           std::to_string(model.topology()->vertexCount()) + " and " + std::to_string(state));
+}
+
+std::optional<JacobianFieldWeights> fieldFrom(const ModelManifest& manifest, const TensorFile& tensors,
+                                              const BodyModel& model) {
   if (manifest.format_version != kFieldVersion) return std::nullopt;
   auto weights = readJacobianField(tensors, kField);
   const JacobianField complete(weights);  // says what does not fit
+  if (weights.regression) requireRegression(*weights.regression, model);
   return weights;
 }
 
@@ -171,7 +183,8 @@ void requireBody(const ModelManifest& manifest) {
 StoredBody bodyFrom(const ModelManifest& manifest, const TensorFile& tensors) try {
   requireBody(manifest);
   auto model = modelFrom(manifest.description, tensors);
-  return {std::move(model), recordFrom(manifest.description, tensors), fieldFrom(manifest, tensors)};
+  auto field = fieldFrom(manifest, tensors, model);
+  return {std::move(model), recordFrom(manifest.description, tensors), std::move(field)};
 } catch (const nlohmann::json::exception& problem) {
   throw InvalidInput("manifest", std::string("has a faulty description: ") + problem.what());
 }

@@ -24,6 +24,7 @@ BootstrapOptions quickOptions() {
   options.rounds = 2;
   options.modes = 3;
   options.least_joined = 1;
+  options.virtual_scans = 1;
   options.scanner.points = 2000;
   options.scanner.ring_radius = 2;
   options.scanner.noise = 0.0005;

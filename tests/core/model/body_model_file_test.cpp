@@ -177,6 +177,23 @@ TEST_CASE("a body model takes its field and how it grew along") {
   CHECK(loaded.field->mlp[0].weight == field.mlp[0].weight);
   CHECK(loaded.field->scaling.signature_mean == field.scaling.signature_mean);
 
+  auto regressing = field;
+  const auto vertices = model.topology()->vertexCount(), turns = 3 * (model.skeleton().jointCount() - 1);
+  regressing.regression = ResidualRegressionWeights{
+      Eigen::MatrixXf::Random(vertices, 2), Eigen::MatrixXf::Random(model.modeCount() + turns, 2),
+      Eigen::VectorXf::Random(3 * vertices), Eigen::MatrixXf::Random(3 * vertices, 2)};
+  publishBody(directory, "regressing", model, grown, {}, &regressing);
+  const auto again = loadBody(directory.load("regressing"));
+  REQUIRE(again.field->regression);
+  CHECK(again.field->regression->offset_weights == regressing.regression->offset_weights);
+  CHECK(again.field->regression->state_weights == regressing.regression->state_weights);
+  CHECK(again.field->regression->mean == regressing.regression->mean);
+  CHECK(again.field->regression->modes == regressing.regression->modes);
+  CHECK_FALSE(loaded.field->regression);
+  regressing.regression->state_weights.conservativeResize(turns, 2);
+  publishBody(directory, "other", model, grown, {}, &regressing);
+  CHECK_THROWS_WITH(loadBody(directory.load("other")), Catch::Contains("field.regression"));
+
   auto damaged = field;
   damaged.mlp[0].bias.conservativeResize(8);
   publishBody(directory, "damaged", model, grown, {}, &damaged);
