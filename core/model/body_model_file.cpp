@@ -5,11 +5,15 @@
 #include "core/io/file_error.h"
 #include "core/io/json_fields.h"
 #include "core/model/sparse_tensors.h"
+#include "core/neural/jacobian_field_file.h"
 
 namespace shaped {
 namespace {
 
-constexpr int kFormatVersion = 1;
+/// Of models without a field, and of those with one: a daemon that knows of none must not serve those as if they had
+/// none.
+constexpr int kPlainVersion = 1, kFieldVersion = 2;
+constexpr const char* kField = "field";
 constexpr int kMostCount = 1'000'000'000;  ///< of anything that a description counts
 constexpr std::size_t kMostJoints = 1000;  ///< a fit's work and memory grow with their square
 constexpr std::pair<PostureNormalisation, const char*> kPostures[] = {{PostureNormalisation::kNone, "none"},
@@ -94,7 +98,15 @@ BodyTrainingRecord recordFrom(const nlohmann::json& description, const TensorFil
   record.seconds = description.at("training").at("seconds").get<double>();
   record.variances = vectorFrom(tensors, "variances");
   requireFalling("variances", record.variances);
+  if (description.contains("joined")) record.joined = description.at("joined").get<std::vector<int>>();
   return record;
+}
+
+std::optional<JacobianFieldWeights> fieldFrom(const ModelManifest& manifest, const TensorFile& tensors) {
+  if (manifest.format_version != kFieldVersion) return std::nullopt;
+  auto weights = readJacobianField(tensors, kField);
+  const JacobianField complete(weights);  // says what does not fit
+  return weights;
 }
 
 }  // namespace
@@ -112,7 +124,8 @@ PostureNormalisation postureNamed(const std::string& text, const std::string& fi
 }
 
 std::int64_t publishBody(const ModelDirectory& directory, const std::string& name, const BodyModel& model,
-                         const BodyTrainingRecord& training, const nlohmann::json& provenance) {
+                         const BodyTrainingRecord& training, const nlohmann::json& provenance,
+                         const JacobianFieldWeights* field) {
   const auto& parts = model.parts();
   TensorWriter tensors;
   tensors.addMatrix("faces", parts.topology->faces());
@@ -126,9 +139,10 @@ std::int64_t publishBody(const ModelDirectory& directory, const std::string& nam
     tensors.addMatrix("limits.low", parts.limits->low);
     tensors.addMatrix("limits.high", parts.limits->high);
   }
+  if (field) addJacobianField(kField, *field, tensors);
   ModelManifest manifest;
   manifest.kind = kBodyKind;
-  manifest.format_version = kFormatVersion;
+  manifest.format_version = field ? kFieldVersion : kPlainVersion;
   manifest.created_by = "shaped " SHAPED_VERSION;
   manifest.description = {{"vertices", parts.topology->vertexCount()},
                           {"faces", parts.topology->faces().rows()},
@@ -139,6 +153,7 @@ std::int64_t publishBody(const ModelDirectory& directory, const std::string& nam
                           {"training_shapes", training.registrations},
                           {"posture", shaped::name(training.posture)},
                           {"reach", training.reach},
+                          {"joined", training.joined},
                           {"training", {{"seconds", training.seconds}}},
                           {"provenance", provenance}};
   return directory.publish(name, std::move(manifest), tensors);
@@ -147,16 +162,16 @@ std::int64_t publishBody(const ModelDirectory& directory, const std::string& nam
 void requireBody(const ModelManifest& manifest) {
   if (manifest.kind != kBodyKind)
     throw InvalidInput("manifest", "is of kind \"" + manifest.kind + "\", want \"" + kBodyKind + "\"");
-  if (manifest.format_version != kFormatVersion)
+  if (manifest.format_version != kPlainVersion && manifest.format_version != kFieldVersion)
     throw InvalidInput("manifest", "has format version " + std::to_string(manifest.format_version) + ", want " +
-                                       std::to_string(kFormatVersion) +
+                                       std::to_string(kPlainVersion) + " or " + std::to_string(kFieldVersion) +
                                        "; train it again or use the daemon that wrote it");
 }
 
 StoredBody bodyFrom(const ModelManifest& manifest, const TensorFile& tensors) try {
   requireBody(manifest);
   auto model = modelFrom(manifest.description, tensors);
-  return {std::move(model), recordFrom(manifest.description, tensors)};
+  return {std::move(model), recordFrom(manifest.description, tensors), fieldFrom(manifest, tensors)};
 } catch (const nlohmann::json::exception& problem) {
   throw InvalidInput("manifest", std::string("has a faulty description: ") + problem.what());
 }

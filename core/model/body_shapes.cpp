@@ -55,10 +55,19 @@ BodyState stateOf(const BodyModel& model, const BodyCoefficients& coefficients) 
   return {numbers.head(modes), poseFrom(numbers.tail(3 + 3 * joints))};
 }
 
-BodyShapes::BodyShapes(BodyModel model, BodyTrainingRecord training)
+BodyShapes::BodyShapes(BodyModel model, BodyTrainingRecord training, std::optional<JacobianFieldWeights> field)
     : model_(std::make_shared<const BodyModel>(std::move(model))),
       training_(std::move(training)),
-      reference_(referenceOf(model_->parts())) {}
+      reference_(referenceOf(model_->parts())),
+      field_(std::move(field)) {
+  if (field_) const JacobianField complete(*field_);  // says what does not fit
+}
+
+std::shared_ptr<const FieldDeformation> BodyShapes::field(const std::stop_token& stop) const {
+  if (!field_) return nullptr;
+  return deformation_.get(
+      stop, [this](const std::stop_token& asked) { return FieldDeformation::make(*model_, *field_, asked); });
+}
 
 std::size_t BodyShapes::bytes() const {
   const auto& parts = model_->parts();
@@ -66,11 +75,15 @@ std::size_t BodyShapes::bytes() const {
   const auto numbers = 2 * (parts.modes.size() + parts.mean.size()) + model_->jointModes().size();
   const auto topology =
       9 * static_cast<std::size_t>(parts.topology->faces().rows()) + 2 * parts.topology->edges().size();
+  const auto deformation = field();
   return sizeof(double) * static_cast<std::size_t>(numbers) + sizeof(std::int32_t) * topology +
-         2 * (bytesOf(parts.weights) + bytesOf(parts.regressor));
+         2 * (bytesOf(parts.weights) + bytesOf(parts.regressor)) + (deformation ? deformation->bytes() : 0);
 }
 
-void BodyShapes::warm() const { model_->posed(model_->meanState()); }
+void BodyShapes::warm() const {
+  model_->posed(model_->meanState());
+  field();
+}
 
 Solved<ShapeProjection> BodyShapes::project(const Vertices& shape, const ProjectionOptions& options) const {
   requireValidShape(topology(), shape, "shape");
@@ -112,7 +125,7 @@ std::unique_ptr<TakeFitter> BodyShapes::takeFitter(const MarkerSet& markers, con
 
 std::int64_t BodyShapes::publish(const ModelDirectory& directory, const std::string& name,
                                  const nlohmann::json& provenance) const {
-  return publishBody(directory, name, *model_, training_, provenance);
+  return publishBody(directory, name, *model_, training_, provenance, field_ ? &*field_ : nullptr);
 }
 
 }  // namespace shaped

@@ -2,6 +2,8 @@
 
 #include "core/model/body_model_file.h"
 #include "core/model/shape_model.h"
+#include "core/numerics/made_once.h"
+#include "core/registration/field_deformation.h"
 
 namespace shaped {
 
@@ -12,9 +14,14 @@ using BodyModelPtr = std::shared_ptr<const BodyModel>;
 /// distance of corresponding vertices.
 class BodyShapes final : public ShapeModel {
  public:
-  BodyShapes(BodyModel model, BodyTrainingRecord training);
+  /// Throws InvalidInput as JacobianField does.
+  BodyShapes(BodyModel model, BodyTrainingRecord training, std::optional<JacobianFieldWeights> field = std::nullopt);
   const BodyModelPtr& model() const { return model_; }
   const BodyTrainingRecord& training() const { return training_; }
+  bool hasField() const { return field_.has_value(); }
+  /// What registerScan deforms this model's fits with. Made when first asked for, which takes about a second for each
+  /// 10,000 vertices; warm() and bytes() ask. Null without a field, or once the stop token has fired.
+  std::shared_ptr<const FieldDeformation> field(const std::stop_token& stop = {}) const;
 
   std::string kind() const override { return kBodyKind; }
   const TopologyPtr& topologyPtr() const override { return model_->topology(); }
@@ -34,6 +41,8 @@ class BodyShapes final : public ShapeModel {
   BodyModelPtr model_;
   BodyTrainingRecord training_;
   PostureTemplate reference_;  ///< the mean, at rest
+  std::optional<JacobianFieldWeights> field_;
+  MadeOnce<FieldDeformation> deformation_;
 };
 
 /// A state as one vector. modes: identities of fewer numbers are filled up with zeros.

@@ -21,7 +21,8 @@ ShapeModelPtr shellPga(const ModelManifest& manifest, const std::shared_ptr<cons
 
 ShapeModelPtr body(const ModelManifest& manifest, const std::shared_ptr<const TensorFile>& tensors) {
   auto stored = bodyFrom(manifest, *tensors);
-  return std::make_shared<const BodyShapes>(std::move(stored.model), std::move(stored.training));
+  return std::make_shared<const BodyShapes>(std::move(stored.model), std::move(stored.training),
+                                            std::move(stored.field));
 }
 
 constexpr Kind kKinds[] = {{kShellPgaKind, requireShellPga, shellPga}, {kBodyKind, requireBody, body}};

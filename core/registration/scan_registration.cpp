@@ -5,6 +5,7 @@
 
 #include "core/mesh/quality.h"
 #include "core/numerics/error.h"
+#include "core/registration/model_pairs.h"
 #include "core/registration/scan_checks.h"
 
 namespace shaped {
@@ -14,17 +15,12 @@ using Result = Solved<ScanRegistration>;
 
 std::string percent(double share) { return std::to_string(int(std::lround(100 * share))) + " %"; }
 
-/// The scan in metres, its normals outwards.
+/// The scan in metres, its normals outwards, and what is to be said of that.
 Scan prepared(const Scan& scan, const BodyModel& model, const ScanRegistrationOptions& options,
               ScanRegistration& result) {
-  requireUsableScan(scan, "scan");
-  Scan ready = scan;
-  ready.points *= options.unit_factor;
+  Scan ready = preparedScan(scan, options.unit_factor);
   result.suspected_unit_factor = suspectedUnitFactor(ready, robustExtent(model.parts().mean));
-  if (pointsInwards(ready)) {
-    ready = flipped(ready);
-    result.flipped_normals = true;
-  }
+  result.flipped_normals = pointsInwards(scan);
   return ready;
 }
 
@@ -87,6 +83,19 @@ void addWarnings(const ScanRegistrationOptions& options, const Outcome& outcome,
   if (result.report.seen < 0.5)
     warnings.push_back("the scan shows " + percent(result.report.seen) +
                        " of the surface alone: the rest is the model's guess");
+  if (options.field && !result.field)
+    warnings.push_back("the model's field deformed nothing, as the fit failed or next to no point lies on it");
+  if (result.field && result.field->report.chamfer > result.report.chamfer)
+    warnings.push_back("the model's field brought the surface no nearer to the scan");
+}
+
+void deformByField(const ScanSurface& surface, const BodyModel& model, const ScanRegistrationOptions& options,
+                   ScanRegistration& result) {
+  auto deformed = options.field->deform(model, result.state, surface);
+  if (!deformed) return;
+  const auto report = ModelPairs(surface, model, options.fit).report(deformed->posed, options.fit.levels.back());
+  result.field = FieldRegistration{std::move(deformed->rest), report};
+  result.vertices = std::move(deformed->posed);
 }
 
 void refine(const ScanSurface& surface, const BodyModel& model, const std::vector<Landmark>& landmarks,
@@ -109,6 +118,7 @@ Result registered(const ScanSurface& surface, const BodyModel& model, const Body
   result.solution.report = fit.solution.report;
   result.solution.vertices = model.posed(fit.solution.state).vertices();
   const bool usable = fit.converged() || fit.termination == Termination::kIterationLimit;
+  if (options.field && usable) deformByField(surface, model, options, result.solution);
   if (options.refine && usable) refine(surface, model, landmarks, options, result);
   result.solution.score = scoreOf(surface, model, result.solution.vertices);
   addWarnings(options, result, result.solution);
@@ -153,6 +163,13 @@ Result registerScanFrom(const Scan& scan, const BodyModel& model, const BodyStat
   ScanRegistration begun;
   const ScanSurface surface(prepared(scan, model, options, begun));
   return registered(surface, model, start, landmarks, options, std::move(begun));
+}
+
+Scan preparedScan(const Scan& scan, double unit_factor) {
+  requireUsableScan(scan, "scan");
+  Scan ready = pointsInwards(scan) ? flipped(scan) : scan;
+  ready.points *= unit_factor;
+  return ready;
 }
 
 bool pointsInwards(const Scan& scan) {

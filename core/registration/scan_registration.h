@@ -4,6 +4,7 @@
 #include <string>
 #include <vector>
 
+#include "core/registration/field_deformation.h"
 #include "core/registration/rigid_start.h"
 #include "core/registration/scan_to_model.h"
 #include "core/registration/template_fitting.h"
@@ -18,6 +19,7 @@ struct ScanRegistrationOptions {
   ModelFitOptions fit;
   bool refine = false;  ///< whether the fitted surface is then deformed onto the scan (fitTemplate)
   FittingOptions refinement = refinementDefaults();
+  std::shared_ptr<const FieldDeformation> field = {};  ///< of the model: then deforms the fitted surface; none: nothing
   double unit_factor = 1;         ///< the scan is multiplied by it first, > 0: 0.001 for millimetres
   double doubtful_margin = 0.35;  ///< of the rigid start: below it the runner-up is tried as well, >= 0
   double least_score = 0.85;      ///< below it the registration is called doubtful, 0 to 1
@@ -26,11 +28,18 @@ struct ScanRegistrationOptions {
   std::optional<std::string> firstViolation() const;  ///< "unit_factor = 0, want > 0"
 };
 
+/// What a model's field made of its surface.
+struct FieldRegistration {
+  Vertices rest;          ///< X', V x 3: the surface in the model's rest pose (FieldDeformation)
+  ModelFitReport report;  ///< of that surface, as ScanRegistration::report of the model's
+};
+
 /// A raw scan in the model's topology.
 struct ScanRegistration {
   BodyState state;
-  Vertices vertices;      ///< V x 3, in the scan's place (times unit_factor): the model's surface, or the refined one
+  Vertices vertices;      ///< V x 3, in the scan's place (times unit_factor): of the model, its field or the refinement
   ModelFitReport report;  ///< of the model
+  std::optional<FieldRegistration> field;  ///< where a field deformed the surface
   std::optional<FittingReport> refinement;
   double start_margin = 0;  ///< RigidStart::margin
   bool took_runner_up = false;
@@ -41,7 +50,9 @@ struct ScanRegistration {
 };
 
 /// Registers a raw scan, whatever its placement: rigid start (both ways where it is ambiguous), identity and pose
-/// (fitModelToScan), and the surface itself where asked for. With three landmarks or more the start comes from them.
+/// (fitModelToScan), the model's field where one is given, and the surface itself where asked for. With three landmarks
+/// or more the start comes from them. A fit that failed is not deformed further; nor does a field deform what next to
+/// no point of the scan lies on, which a warning says.
 ///
 /// residual and termination are of the model's fit, or of the refinement where that did not converge. Throws
 /// InvalidInput naming an option, `scan` (requireUsableScan) or a landmark.
@@ -52,6 +63,10 @@ Solved<ScanRegistration> registerScan(const Scan& scan, const BodyModel& model, 
 Solved<ScanRegistration> registerScanFrom(const Scan& scan, const BodyModel& model, const BodyState& start,
                                           const std::vector<Landmark>& landmarks,
                                           const ScanRegistrationOptions& options = {});
+
+/// The scan as it is registered: times unit_factor, its normals outwards. Throws InvalidInput naming `scan`
+/// (requireUsableScan).
+Scan preparedScan(const Scan& scan, double unit_factor);
 
 /// Whether the normals of a scan point inwards on the whole: the mean of n . (x - centre), which for a closed surface
 /// is three times its volume, is negative. False without normals.

@@ -34,7 +34,7 @@ void requireUsable(const BodyModel& model) {
 
 /// Numbers of any size may overflow, but not crash.
 void answerOnce(StoredBody stored) {
-  const BodyShapes shapes(std::move(stored.model), std::move(stored.training));
+  const BodyShapes shapes(std::move(stored.model), std::move(stored.training), std::move(stored.field));
   shapes.warm();
   const auto state = shapes.model()->meanState();
   accepted<InvalidInput>([&] { return shapes.synthesize(coefficientsOf(state, shapes.modes()), {}); });

@@ -1,0 +1,280 @@
+#include "core/bootstrap/bootstrap.h"
+
+#include <oneapi/tbb/parallel_for.h>
+
+#include <algorithm>
+#include <mutex>
+
+#include "core/bootstrap/acceptance.h"
+#include "core/bootstrap/field_examples.h"
+#include "core/bootstrap/round_scans.h"
+#include "core/numerics/error.h"
+#include "core/registration/scan_checks.h"
+
+namespace shaped {
+namespace {
+
+/// Parts of a round's share of the whole, about as they take their time.
+constexpr double kFieldBegins = 0.3, kScansBegin = 0.5;
+
+void requireInputs(const BootstrapInputs& inputs, const FieldTrainer& train, const BootstrapOptions& options) {
+  if (const auto problem = options.firstViolation()) throw InvalidInput("options", *problem);
+  if (!train) throw InvalidInput("train", "is empty, want a function that trains a field");
+  if (inputs.registrations.size() < 2)
+    throw InvalidInput("registrations", "has " + std::to_string(inputs.registrations.size()) + ", want at least two");
+  if (inputs.scans.count == 0) throw InvalidInput("scans", "there is none; want at least one that is not registered");
+  if (!inputs.scans.load || !inputs.scans.name) throw InvalidInput("scans", "have no function that loads or names one");
+}
+
+void requireSameKind(const BootstrapCheckpoint& checkpoint, const BootstrapInputs& inputs) {
+  const auto examples = checkpoint.examples.size();
+  bool fits = examples == 0 || examples == inputs.examples.size();
+  for (const auto& scan : checkpoint.scans) fits = fits && scan.report.scan < inputs.scans.count;
+  for (const auto& shape : checkpoint.joined) fits = fits && shape.rows() == inputs.reference.rest.rows();
+  if (!fits) throw InvalidInput("checkpoint", "is of other inputs; begin anew");
+}
+
+/// A run of Algorithm 2 from a checkpoint on.
+class Bootstrap {
+ public:
+  Bootstrap(const BootstrapInputs& inputs, const FieldTrainer& train, const BootstrapOptions& options,
+            const BootstrapWatch& watch, BootstrapCheckpoint state)
+      : inputs_(inputs),
+        train_(train),
+        options_(options),
+        watch_(watch),
+        examples_(inputs, options),
+        state_(std::move(state)),
+        registrations_(inputs.registrations) {
+    registrations_.insert(registrations_.end(), state_.joined.begin(), state_.joined.end());
+    state_.examples.resize(inputs.examples.size());
+  }
+
+  std::optional<Bootstrapped> run() {
+    auto grown = grownModel();
+    if (!grown) note([] {});  // stopped: whoever keeps checkpoints is offered the last
+    return grown;
+  }
+
+ private:
+  std::optional<Bootstrapped> grownModel() {
+    while (true) {
+      auto trained = learnModel();
+      if (!trained) return std::nullopt;
+      reference_.reset();
+      if (!state_.field && !learnField(trained->model)) return std::nullopt;
+      if (const auto end = endReached())
+        return Bootstrapped{std::move(trained->model),
+                            std::move(trained->variances),
+                            *state_.field,
+                            state_.rounds,
+                            state_.joined,
+                            *end};
+      if (!runRound(trained->model)) return std::nullopt;
+    }
+  }
+
+  std::optional<TrainedBody> learnModel() {
+    tell("learning a model of " + std::to_string(registrations_.size()) + " registrations", 0);
+    BodyTrainingOptions training;
+    training.posture = options_.posture;
+    training.reach = options_.reach;
+    training.modes = options_.modes;
+    training.stop = watch_.stop;
+    return trainBody(inputs_.reference, registrations_, training);
+  }
+
+  /// Null once the token has fired.
+  std::shared_ptr<const FieldReference> referenceOf(const BodyModel& model) {
+    if (reference_) return reference_;
+    auto made = makeFieldReference(model.topology(), model.parts().mean, watch_.stop);
+    if (made) reference_ = std::make_shared<const FieldReference>(std::move(*made));
+    return reference_;
+  }
+
+  bool learnField(const BodyModel& model) {
+    if (!fitExamples(model)) return false;
+    FieldTrainingSet set{state_.trainings + 1, referenceOf(model), {}, pairsOf(model)};
+    if (!set.reference || stopped()) return false;
+    if (set.pairs.empty())
+      throw InvalidInput("examples",
+                         "none can be fitted by the model, so that there is nothing to train a field on; "
+                         "do the scans show what the registrations do?");
+    set.scaling = scalingOf(*set.reference);
+    tell("training the field on " + std::to_string(set.pairs.size()) + " scans", kFieldBegins);
+    auto field = train_(set, watch_.stop);
+    if (!field) return false;
+    const JacobianField complete(*field);  // says what does not fit
+    note([&] {
+      state_.field = std::move(field);
+      ++state_.trainings;
+    });
+    return true;
+  }
+
+  bool fitExamples(const BodyModel& model) {
+    forAll(inputs_.examples.size(), [&](std::size_t i) {
+      if (state_.examples[i]) return;
+      auto fitted = examples_.fit(i, model, watch_.stop);
+      if (!fitted) return;
+      note([&] {
+        state_.examples[i] = std::move(fitted);
+        const auto done = std::count_if(state_.examples.begin(), state_.examples.end(),
+                                        [](const auto& example) { return example.has_value(); });
+        tellOf("fitting the field's scans, ", done, inputs_.examples.size(), 0, kFieldBegins);
+      });
+    });
+    return !stopped();
+  }
+
+  /// Those that were fitted, in the examples' order.
+  std::vector<RestPair> pairsOf(const BodyModel& model) const {
+    std::vector<std::optional<RestPair>> pairs(inputs_.examples.size());
+    forAll(pairs.size(), [&](std::size_t i) {
+      if (taught(i)) pairs[i] = examples_.pair(i, model, *state_.examples[i]);
+    });
+    std::vector<RestPair> usable;
+    for (auto& pair : pairs)
+      if (pair && pair->scan.points.rows() >= kFewestScanPoints) usable.push_back(std::move(*pair));
+    return usable;
+  }
+
+  bool taught(std::size_t i) const { return state_.examples[i] && state_.examples[i]->identity.size() > 0; }
+
+  std::optional<BootstrapEnd> endReached() const {
+    const auto& rounds = state_.rounds;
+    if (!rounds.empty() && rounds.back().joined < static_cast<std::size_t>(options_.least_joined))
+      return BootstrapEnd::kFewJoined;
+    if (std::ssize(rounds) >= options_.rounds) return BootstrapEnd::kRoundsDone;
+    if (scansToTry(inputs_.scans.count, rounds, options_).empty()) return BootstrapEnd::kNoneLeft;
+    return std::nullopt;
+  }
+
+  bool runRound(const BodyModel& model) {
+    auto registration = options_.registration;
+    registration.refine = false;
+    registration.stop = watch_.stop;
+    const auto reference = referenceOf(model);
+    if (!reference) return false;
+    registration.field = std::make_shared<const FieldDeformation>(reference, *state_.field);
+    const RoundScans scans{inputs_.scans, model, registration};
+    return registerScans(scans) && endRound(scans);
+  }
+
+  bool registerScans(const RoundScans& scans) {
+    const auto chosen = scansToTry(inputs_.scans.count, state_.rounds, options_);
+    std::vector<std::size_t> waiting;
+    for (const auto scan : chosen)
+      if (placeOf(scan) == state_.scans.end()) waiting.push_back(scan);
+    forAll(waiting.size(), [&](std::size_t i) {
+      auto fitted = scans.fit(waiting[i], roundNumber());
+      if (!fitted) return;
+      note([&] {
+        if (watch_.each_scan) watch_.each_scan(fitted->report);
+        const auto at = std::partition_point(state_.scans.begin(), state_.scans.end(), [&](const FittedScan& done) {
+          return done.report.scan < fitted->report.scan;
+        });
+        state_.scans.insert(at, std::move(*fitted));
+        tellOf("registering scans, ", std::ssize(state_.scans), chosen.size(), kScansBegin, 1);
+      });
+    });
+    return !stopped();
+  }
+
+  std::vector<FittedScan>::const_iterator placeOf(std::size_t scan) const {
+    return std::find_if(state_.scans.begin(), state_.scans.end(),
+                        [&](const FittedScan& done) { return done.report.scan == scan; });
+  }
+
+  /// Those that join are deformed once more: their surfaces are too large to be kept for all that are tried.
+  bool endRound(const RoundScans& scans) {
+    BootstrapRound round;
+    round.round = roundNumber();
+    round.registrations = registrations_.size();
+    for (std::size_t i = 0; i < inputs_.examples.size(); ++i) round.examples += taught(i);
+    for (const auto& fitted : state_.scans) round.scans.push_back(fitted.report);
+    judge(options_.acceptance, round);
+    std::vector<const FittedScan*> joining;
+    for (std::size_t i = 0; i < round.scans.size(); ++i)
+      if (round.scans[i].verdict == ScanVerdict::kJoined) joining.push_back(&state_.scans[i]);
+    std::vector<Vertices> surfaces(joining.size());
+    forAll(joining.size(), [&](std::size_t i) { surfaces[i] = scans.restSurface(*joining[i]); });
+    if (stopped()) return false;
+    note([&] { grow(std::move(round), surfaces); });
+    return true;
+  }
+
+  void grow(BootstrapRound round, const std::vector<Vertices>& surfaces) {
+    for (auto* shapes : {&state_.joined, &registrations_})
+      shapes->insert(shapes->end(), surfaces.begin(), surfaces.end());
+    state_.scans.clear();
+    if (!surfaces.empty()) {  // else model and field are what they would become
+      state_.field.reset();
+      std::fill(state_.examples.begin(), state_.examples.end(), std::nullopt);
+    }
+    state_.rounds.push_back(std::move(round));
+    if (watch_.each_round) watch_.each_round(state_.rounds.back());
+  }
+
+  int roundNumber() const { return static_cast<int>(state_.rounds.size()) + 1; }
+
+  template <class Work>
+  void forAll(std::size_t count, const Work& work) const {
+    // One at a time to each thread: they take seconds, and differ.
+    tbb::parallel_for(
+        tbb::blocked_range<std::size_t>(0, count, 1),
+        [&](const auto& range) {
+          for (auto i = range.begin(); i < range.end(); ++i)
+            if (!stopped()) work(i);
+        },
+        tbb::simple_partitioner());
+  }
+
+  /// Changes the state, and offers it.
+  template <class Change>
+  void note(const Change& change) {
+    const std::lock_guard lock(mutex_);
+    change();
+    if (watch_.checkpoint) watch_.checkpoint([this] { return state_; });
+  }
+
+  bool stopped() const { return watch_.stop.stop_requested(); }
+
+  void tell(const std::string& what, double share) const {
+    if (!watch_.progress) return;
+    const auto number = roundNumber();
+    const bool last = endReached().has_value();
+    const std::string where =
+        last ? "last model: " : "round " + std::to_string(number) + " of " + std::to_string(options_.rounds) + ": ";
+    // Of all rounds and what is learned after them.
+    const double done = last ? options_.rounds + share : number - 1 + share;
+    watch_.progress({where + what, done / (options_.rounds + 1), 0});
+  }
+
+  void tellOf(const std::string& what, std::ptrdiff_t done, std::size_t count, double from, double to) const {
+    tell(what + std::to_string(done) + " of " + std::to_string(count),
+         from + (to - from) * static_cast<double>(done) / static_cast<double>(count));
+  }
+
+  const BootstrapInputs& inputs_;
+  const FieldTrainer& train_;
+  const BootstrapOptions& options_;
+  const BootstrapWatch& watch_;
+  FieldExamples examples_;
+  BootstrapCheckpoint state_;
+  std::vector<Vertices> registrations_;              ///< R_PCA
+  std::shared_ptr<const FieldReference> reference_;  ///< of the present model, once it is wanted
+  std::mutex mutex_;                                 ///< of the state while scans are worked on, and of who watches
+};
+
+}  // namespace
+
+std::optional<Bootstrapped> bootstrapBody(const BootstrapInputs& inputs, const FieldTrainer& train,
+                                          const BootstrapOptions& options, const BootstrapWatch& watch,
+                                          std::optional<BootstrapCheckpoint> resumed) {
+  requireInputs(inputs, train, options);
+  if (resumed) requireSameKind(*resumed, inputs);
+  return Bootstrap(inputs, train, options, watch, resumed ? std::move(*resumed) : BootstrapCheckpoint{}).run();
+}
+
+}  // namespace shaped

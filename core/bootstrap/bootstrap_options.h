@@ -1,0 +1,28 @@
+#pragma once
+
+#include <cstdint>
+#include <optional>
+#include <string>
+
+#include "core/body/posture.h"
+#include "core/registration/scan_registration.h"
+#include "core/sample/virtual_scanner.h"
+
+namespace shaped {
+
+struct BootstrapOptions {
+  int rounds = 5;         ///< at most, >= 1
+  int modes = 11;         ///< k of each round's model, >= 1; fewer where the registrations have fewer
+  int least_joined = 10;  ///< a round in which fewer join is the last, >= 1
+  int sample = 0;         ///< scans that a round tries, drawn from those left, >= 0; 0: all
+  double acceptance = 1;  ///< standard deviations above the smallest distance up to which a registration joins, >= 0
+  PostureNormalisation posture = PostureNormalisation::kSkeleton;
+  double reach = 0.1;                    ///< of PostureNormalisation::kLocal, m, > 0
+  ScanRegistrationOptions registration;  ///< its field, stop and `refine` are not looked at
+  VirtualScannerOptions scanner;         ///< of registrations without a scan; its seed is not looked at
+  std::uint64_t seed = 1;                ///< of virtual scans and samples
+
+  std::optional<std::string> firstViolation() const;  ///< "rounds = 0, want >= 1"
+};
+
+}  // namespace shaped

@@ -1,0 +1,63 @@
+#pragma once
+
+#include <memory>
+#include <optional>
+#include <stop_token>
+
+#include "core/body/body_model.h"
+#include "core/neural/jacobian_field.h"
+#include "core/registration/scan_surface.h"
+
+namespace shaped {
+
+/// What of a scan is carried to the rest pose.
+struct RestScanOptions {
+  double max_distance = 0.02;    ///< of a point from the posed surface, relative to the mean's bounding box, > 0
+  double max_normal_angle = 70;  ///< between its normal and the surface's, degrees, (0, 180]; lines if unoriented
+  int points = 10000;            ///< of the scan that are looked at, evenly by index, >= 1
+};
+
+/// A scan in the rest pose of the body that was fitted to it, by inverse skinning: a point p whose nearest point of the
+/// posed surface is x goes to where x is at rest, plus T^-1 (p - x) with the skinning's linear part T there. So points
+/// of the posed surface come to lie on the surface at rest exactly. Left out are points that are far from the surface,
+/// whose normal says that they belong to another sheet of it (an arm against the trunk), or that bones standing nearly
+/// opposite to each other carry. Normals are turned along and point outwards; no faces.
+///
+/// state: where the model lies on the scan. May leave no point. Throws InvalidInput naming what does not fit.
+Scan scanAtRest(const BodyModel& model, const BodyState& state, const ScanSurface& scan,
+                const RestScanOptions& options = {});
+
+/// A body's surface as a field sees it on a scan.
+struct DeformedBody {
+  Vertices rest;   ///< X' of [Mur25] Algorithm 2, V x 3, in the model's rest pose
+  Vertices posed;  ///< V x 3, in the scan's place
+};
+
+/// A trained Jacobian field with what it needs of a model: from identity and pose that were fitted to a scan to the
+/// surface beyond the model's linear space ([Mur25] 3.3.3 and 3.3.4). Immutable; usable from several threads at once.
+class FieldDeformation {
+ public:
+  /// Of a model: Jacobians are relative to its mean at rest. Null once the stop token has fired. Throws InvalidInput as
+  /// makeFieldReference and JacobianField do.
+  static std::shared_ptr<const FieldDeformation> make(const BodyModel& model, JacobianFieldWeights weights,
+                                                      const std::stop_token& stop = {});
+  FieldDeformation(std::shared_ptr<const FieldReference> reference, JacobianFieldWeights weights);
+
+  /// X_o = model.rest(state.identity) deformed as the field says of it and of scanAtRest(). A field says nothing of
+  /// places: at rest each component stays centred where it is in X_o. Then the bones of the fit carry it as they carry
+  /// X_o: about X_o's joints, so that what the field brought onto the scan at rest comes to lie on the scan.
+  ///
+  /// Nothing when fewer than kFewestScanPoints points of the scan come to rest. Throws InvalidInput naming `model` when
+  /// its topology is not the field's reference's, or `state`.
+  std::optional<DeformedBody> deform(const BodyModel& model, const BodyState& state, const ScanSurface& scan) const;
+
+  const JacobianFieldWeights& weights() const { return field_.weights(); }
+  /// Memory of reference and field, about.
+  std::size_t bytes() const;
+
+ private:
+  std::shared_ptr<const FieldReference> reference_;
+  JacobianField field_;
+};
+
+}  // namespace shaped
