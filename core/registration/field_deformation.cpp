@@ -1,5 +1,6 @@
 #include "core/registration/field_deformation.h"
 
+#include <Eigen/LU>
 #include <algorithm>
 #include <cmath>
 #include <numbers>
