@@ -103,8 +103,7 @@ void describe(const BodyShapes& shapes, v1::ModelDescription& description) {
     message.set_parent(joint.parent);
   }
   body.set_limits(parts.limits.has_value());
-  for (const auto& [wire, posture] : kPostures)
-    if (posture == training.posture && wire != v1::POSTURE_NORMALISATION_UNSPECIFIED) body.set_posture(wire);
+  body.set_posture(server::toProto(training.posture));
   for (const double value : training.variances) body.add_variances(value);
   body.set_field(shapes.hasField());
   for (const int joined : training.joined) body.add_joined(static_cast<std::uint32_t>(joined));
@@ -180,6 +179,12 @@ PostureNormalisation postureFromProto(v1::PostureNormalisation wanted, const std
   for (const auto& [wire, posture] : kPostures)
     if (wire == wanted) return posture;
   throw InvalidInput(field, std::to_string(wanted) + " is no PostureNormalisation");
+}
+
+v1::PostureNormalisation toProto(PostureNormalisation posture) {
+  for (const auto& [wire, one] : kPostures)
+    if (one == posture && wire != v1::POSTURE_NORMALISATION_UNSPECIFIED) return wire;
+  return v1::POSTURE_NORMALISATION_UNSPECIFIED;
 }
 
 void toProto(const ShapeScore& score, v1::Score& message) {

@@ -87,17 +87,30 @@ void requireScans(const DatasetStore& datasets, const v1::Bootstrap& message, st
                                                     " registrations that train the field");
 }
 
-/// The model that gives the template; the dataset is its own where none is named.
+/// The dataset that a model was trained on. Throws InvalidInput, NotFound.
+std::string datasetOf(const ServedModel& served, const DatasetStore& datasets) {
+  auto name = provenanceOf(served.manifest).dataset;
+  if (name.empty()) throw InvalidInput("dataset", "is missing, and the model does not say what it was trained on");
+  try {
+    datasets.get(name);
+  } catch (const NotFound&) {
+    throw NotFound("the dataset \"" + name + "\" that model " + served.name + " version " +
+                   std::to_string(served.version) + " was trained on has been deleted; name another");
+  }
+  return name;
+}
+
+/// The model that gives the template; dataset, posture and reach are its own where none are named.
 void takeTemplateModel(const JobContext& context, v1::TrainRequest& request) {
   auto& bootstrap = *request.mutable_bootstrap();
   if (!bootstrap.rig().empty())
     throw InvalidInput("bootstrap.rig", "goes without template_model, which has a rig of its own");
   const auto served = context.models.pin(selectorFromProto(bootstrap.template_model()));
-  bodyFor("a bootstrap's template", *served);
+  const auto& training = bodyFor("a bootstrap's template", *served).training();
   nameVersion(*served, *bootstrap.mutable_template_model());
-  if (request.dataset().empty()) request.set_dataset(provenanceOf(served->manifest).dataset);
-  if (request.dataset().empty())
-    throw InvalidInput("dataset", "is missing, and the model does not say what it was trained on");
+  if (request.dataset().empty()) request.set_dataset(datasetOf(*served, context.datasets));
+  if (bootstrap.posture() == v1::POSTURE_NORMALISATION_UNSPECIFIED) bootstrap.set_posture(toProto(training.posture));
+  if (bootstrap.reach() == 0) bootstrap.set_reach(training.reach);
   requireConnectivity(*served, context.datasets.get(request.dataset()));
 }
 
@@ -290,6 +303,9 @@ void repeatBootstrap(const JobRecord& known, v1::TrainRequest& request) {
   auto& bootstrap = *request.mutable_bootstrap();
   if (bootstrap.has_template_model() && before.bootstrap().has_template_model())
     repeatVersion(before.bootstrap().template_model(), *bootstrap.mutable_template_model());
+  if (bootstrap.has_template_model() && bootstrap.posture() == v1::POSTURE_NORMALISATION_UNSPECIFIED)
+    bootstrap.set_posture(before.bootstrap().posture());
+  if (bootstrap.has_template_model() && bootstrap.reach() == 0) bootstrap.set_reach(before.bootstrap().reach());
   if (request.dataset().empty()) request.set_dataset(before.dataset());
 }
 
