@@ -40,7 +40,7 @@ nlohmann::json toJson(const v1::BootstrapRound& round) {
                           {"largest", round.largest()},
                           {"accepted_below", round.accepted_below()},
                           {"scans", nlohmann::json::array()}};
-  for (const auto& scan : round.scans()) document["scans"].push_back(toJson(scan));
+  for (const auto& scan : round.scans()) document["scans"].push_back(shapectl::toJson(scan));
   return document;
 }
 
@@ -48,7 +48,7 @@ std::string scanText(const v1::BootstrapScan& scan, int name_width) {
   const bool joined = scan.verdict() == v1::SCAN_VERDICT_JOINED;
   char numbers[320];
   std::snprintf(numbers, sizeof numbers, "  %-*.200s  %-8s  round %-3u  %9.2f mm  score %.2f", name_width,
-                scan.name().c_str(), nameOf(scan.verdict()).c_str(), scan.round(), 1000 * scan.chamfer(), scan.score());
+                scan.name().c_str(), shapectl::nameOf(scan.verdict()).c_str(), scan.round(), 1000 * scan.chamfer(), scan.score());
   return numbers + (joined || scan.why().empty() ? "" : "  " + scan.why()) + "\n";
 }
 

@@ -2,15 +2,16 @@
 
 #include <Eigen/Core>
 #include <cmath>
-#include <cstdio>
+#include <iomanip>
+#include <sstream>
 
 namespace shaped {
 namespace {
 
 std::string millimetres(double metres) {
-  char text[32];
-  std::snprintf(text, sizeof text, "%.2f mm", 1e3 * metres);
-  return text;
+  std::ostringstream text;
+  text << std::fixed << std::setprecision(2) << 1e3 * metres << " mm";
+  return text.str();
 }
 
 Eigen::ArrayXd distancesOfPending(const std::vector<BootstrapScan>& scans) {

@@ -24,7 +24,7 @@ struct FittedScan {
 struct BootstrapCheckpoint {
   std::string training;                ///< fingerprint of inputs and options, in the caller's words
   std::vector<BootstrapRound> rounds;  ///< that have ended
-  std::vector<Vertices> joined;        ///< X' at rest of the scans that joined, in their order
+  std::vector<Vertices> joined;        ///< Bootstrapped::joined so far
   int trainings = 0;                   ///< fields that were trained
   /// Fits of the field's scans by the present model, as many as there are examples or none; without numbers where the
   /// fit failed or is doubtful.

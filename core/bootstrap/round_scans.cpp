@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <tuple>
 
 #include "core/numerics/error.h"
 #include "core/sample/random.h"
@@ -27,15 +28,15 @@ std::optional<std::string> faultOf(const Topology& topology, const Vertices& sha
 }
 
 /// Why a registration may not join, wherever it lies.
-void doubt(const BodyModel& model, const Solved<ScanRegistration>& solved, double least_score, BootstrapScan& report) {
-  const auto& field = solved.solution.field;
+void doubt(const RoundScans& scans, const Solved<ScanRegistration>& solved, BootstrapScan& report) {
+  const auto& [field, vertices] = std::tie(solved.solution.field, solved.solution.vertices);
   if (!solved.converged() && solved.termination != Termination::kIterationLimit)
     return refuse(ScanVerdict::kFailed, "the fit of the model ended as " + std::string(name(solved.termination)),
                   report);
   if (!field) return refuse(ScanVerdict::kFailed, "next to no point of the scan lies on the fitted model", report);
-  if (const auto fault = faultOf(*model.topology(), field->rest))
+  if (const auto fault = faultOf(*scans.model.topology(), scans.at_rest ? field->rest : vertices))
     return refuse(ScanVerdict::kFailed, "the field made no shape of it: " + *fault, report);
-  if (report.score < least_score)
+  if (report.score < scans.registration.least_score)
     refuse(ScanVerdict::kDoubtful, "only " + percent(report.score) + " of the scan lies on the registered surface",
            report);
 }
@@ -57,20 +58,20 @@ std::optional<FittedScan> RoundScans::fit(std::size_t scan, int round) const {
     report.model_chamfer = found.report.chamfer;
     report.chamfer = found.field ? found.field->report.chamfer : found.report.chamfer;
     fitted.state = found.state;
-    doubt(model, solved, registration.least_score, report);
+    doubt(*this, solved, report);
   } catch (const InvalidInput& problem) {
     refuse(ScanVerdict::kUnusable, problem.what(), report);
   }
   return fitted;
 }
 
-Vertices RoundScans::restSurface(const FittedScan& fitted) const {
+Vertices RoundScans::surface(const FittedScan& fitted) const {
   const auto scan = scans.load(fitted.report.scan);
-  const ScanSurface surface(preparedScan(scan, registration.unit_factor));
-  auto deformed = registration.field->deform(model, fitted.state, surface);
+  const ScanSurface ready(preparedScan(scan, registration.unit_factor));
+  auto deformed = registration.field->deform(model, fitted.state, ready);
   if (!deformed)
     throw InvalidInput("scans", "\"" + fitted.report.name + "\" is no longer the scan that was registered");
-  return std::move(deformed->rest);
+  return at_rest ? std::move(deformed->rest) : std::move(deformed->posed);
 }
 
 std::vector<std::size_t> scansToTry(std::size_t count, const std::vector<BootstrapRound>& rounds,

@@ -5,6 +5,7 @@
 
 #include "core/io/file_error.h"
 #include "tests/support/bodies.h"
+#include "tests/support/fields.h"
 #include "tests/support/temporary_folder.h"
 
 using namespace shaped;
@@ -82,7 +83,9 @@ TEST_CASE("a body model comes back from its file bit for bit") {
   const TemporaryFolder folder;
   const ModelDirectory directory(folder.path());
   const auto stored = published(directory, model, record());
-  const auto [loaded, training] = loadBody(stored);
+  const auto [loaded, training, field] = loadBody(stored);
+  CHECK_FALSE(field);
+  CHECK(stored.manifest.format_version == 1);
   const auto &before = model.parts(), &after = loaded.parts();
   CHECK(after.topology->id() == before.topology->id());
   CHECK(after.mean == before.mean);
@@ -118,7 +121,9 @@ TEST_CASE("body files that hold no body are refused by what is wrong with them")
     CHECK_THROWS_WITH(loadChanged(change), Catch::Contains("model changed version 1") && Catch::Contains(reason));
   };
   refused([](Files& f) { f.manifest.kind = "shell_pga"; }, "is of kind \"shell_pga\", want \"body\"");
-  refused([](Files& f) { f.manifest.format_version = 2; }, "has format version 2, want 1");
+  refused([](Files& f) { f.manifest.format_version = 3; }, "has format version 3, want 1 or 2");
+  refused([](Files& f) { f.manifest.format_version = 2; }, "field.");
+  refused([](Files& f) { f.manifest.description["joined"] = "many"; }, "faulty description");
   refused([](Files& f) { f.manifest.description.erase("joints"); }, "faulty description");
   refused([](Files& f) { f.manifest.description["joints"] = nlohmann::json::array(); }, "joints");
   refused([](Files& f) { f.manifest.description["joints"] = std::vector<int>(1001, 1); },
@@ -152,4 +157,28 @@ TEST_CASE("body files that hold no body are refused by what is wrong with them")
   refused([](Files& f) { f.numbers["limits.low"](1, 2) = 3; }, "limits[1]: has a lower limit above the upper one");
   refused([](Files& f) { f.numbers["limits.low"](1, 2) = kNan; }, "limits[1]");
   refused([](Files& f) { f.numbers.erase("limits.high"); }, "limits.high");
+}
+
+TEST_CASE("a body model takes its field and how it grew along") {
+  const auto model = smallBody(false);
+  const auto field = constantField(scalingOf(*makeFieldReference(model.topology(), model.parts().mean)),
+                                   Eigen::Vector3d(0.1, 0, -0.2).asDiagonal());
+  auto grown = record();
+  grown.joined = {3, 1};
+  const TemporaryFolder folder;
+  const ModelDirectory directory(folder.path());
+  publishBody(directory, "m", model, grown, {}, &field);
+  const auto stored = directory.load("m");
+  CHECK(stored.manifest.format_version == 2);  // a daemon that knows of no field refuses it
+  const auto loaded = loadBody(stored);
+  CHECK(loaded.training.joined == std::vector<int>{3, 1});
+  REQUIRE(loaded.field);
+  CHECK(loaded.field->mlp[0].bias == field.mlp[0].bias);
+  CHECK(loaded.field->mlp[0].weight == field.mlp[0].weight);
+  CHECK(loaded.field->scaling.signature_mean == field.scaling.signature_mean);
+
+  auto damaged = field;
+  damaged.mlp[0].bias.conservativeResize(8);
+  publishBody(directory, "damaged", model, grown, {}, &damaged);
+  CHECK_THROWS_WITH(loadBody(directory.load("damaged")), Catch::Contains("mlp") && Catch::Contains("damaged"));
 }

@@ -7,6 +7,7 @@
 #include "core/model/shell_pga_shapes.h"
 #include "core/numerics/error.h"
 #include "tests/support/bodies.h"
+#include "tests/support/fields.h"
 #include "tests/support/models.h"
 #include "tests/support/temporary_folder.h"
 
@@ -105,4 +106,34 @@ TEST_CASE("models of every kind go through their files by the same door") {
   other.manifest.kind = "blimp";
   CHECK_THROWS_WITH(loadShapeModel(other), Catch::Contains("model b version 1") &&
                                                Catch::Contains("is of kind \"blimp\", want \"shell_pga\" or \"body\""));
+}
+
+TEST_CASE("a body's field is made once, published along, and counted") {
+  const auto& parts = body().model()->parts();
+  const auto weights = constantField(scalingOf(*makeFieldReference(parts.topology, parts.mean)));
+  const BodyShapes with_field(BodyModel(parts), body().training(), weights);
+  CHECK(with_field.hasField());
+  CHECK_FALSE(body().hasField());
+  CHECK_FALSE(body().field());
+  std::stop_source stop;
+  stop.request_stop();
+  CHECK_FALSE(with_field.field(stop.get_token()));
+  with_field.warm();
+  const auto field = with_field.field();
+  REQUIRE(field);
+  CHECK(field == with_field.field());
+  CHECK(with_field.bytes() == body().bytes() + field->bytes());
+  CHECK(field->bytes() > 1000);
+
+  const TemporaryFolder folder;
+  const ModelDirectory directory(folder.path());
+  with_field.publish(directory, "m", nlohmann::json::object());
+  const auto loaded = loadShapeModel(directory.load("m"));
+  const auto& again = dynamic_cast<const BodyShapes&>(*loaded);
+  REQUIRE(again.hasField());
+  CHECK(again.field()->weights().mlp[0].bias == weights.mlp[0].bias);
+
+  auto wrong = weights;
+  wrong.source_net[0].bias.resize(1);
+  CHECK_THROWS_WITH(BodyShapes(BodyModel(parts), body().training(), wrong), Catch::Contains("source_net"));
 }
