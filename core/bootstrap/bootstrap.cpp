@@ -157,7 +157,7 @@ class Bootstrap {
     const auto reference = referenceOf(model);
     if (!reference) return false;
     registration.field = std::make_shared<const FieldDeformation>(reference, *state_.field);
-    const RoundScans scans{inputs_.scans, model, registration, options_.posture == PostureNormalisation::kNone};
+    const RoundScans scans{inputs_.scans, model, registration};
     return registerScans(scans) && endRound(scans);
   }
 
@@ -198,7 +198,7 @@ class Bootstrap {
     for (std::size_t i = 0; i < round.scans.size(); ++i)
       if (round.scans[i].verdict == ScanVerdict::kJoined) joining.push_back(&state_.scans[i]);
     std::vector<Vertices> surfaces(joining.size());
-    forAll(joining.size(), [&](std::size_t i) { surfaces[i] = scans.surface(*joining[i]); });
+    forAll(joining.size(), [&](std::size_t i) { surfaces[i] = scans.restSurface(*joining[i]); });
     if (stopped()) return false;
     note([&] { grow(std::move(round), surfaces); });
     return true;

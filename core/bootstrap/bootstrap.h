@@ -54,7 +54,7 @@ struct Bootstrapped {
   Eigen::VectorXd variances;   ///< of all modes of the last R_PCA, falling [m^2]
   JacobianFieldWeights field;  ///< of the model
   std::vector<BootstrapRound> rounds;
-  std::vector<Vertices> joined;  ///< X' of the scans that joined, in their order, V x 3 (bootstrapBody says where)
+  std::vector<Vertices> joined;  ///< X' at rest, in the order in which they joined, V x 3
   BootstrapEnd end;
 };
 
@@ -64,11 +64,6 @@ struct Bootstrapped {
 /// standard deviations. Ours: a fit that failed or scores below registration.least_score is not compared and never
 /// joins. It ends when fewer than least_joined join, no scan is left, or the rounds are done; model and field are then
 /// learned once more from what there is.
-///
-/// The surfaces that join do so as they lie on their scans, and learning takes their posture out as it does that of all
-/// registrations; with PostureNormalisation::kNone they join at rest, as in the paper. Ours, since what the fit's pose
-/// leaves in the surface at rest is not the body's: limbs of a small model's fit turn about themselves to make up for
-/// what its identities lack, and at rest the surface shows that.
 ///
 /// Targets of the field: of the registration carried back by the fit's pose, as its scan is, and the registration with
 /// its posture normalised and rigidly aligned to X_o, the one that the scan at rest lies nearer to. The first is exact

@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <tuple>
 
 #include "core/numerics/error.h"
 #include "core/sample/random.h"
@@ -29,12 +28,14 @@ std::optional<std::string> faultOf(const Topology& topology, const Vertices& sha
 
 /// Why a registration may not join, wherever it lies.
 void doubt(const RoundScans& scans, const Solved<ScanRegistration>& solved, BootstrapScan& report) {
-  const auto& [field, vertices] = std::tie(solved.solution.field, solved.solution.vertices);
+  const auto& field = solved.solution.field;
   if (!solved.converged() && solved.termination != Termination::kIterationLimit)
     return refuse(ScanVerdict::kFailed, "the fit of the model ended as " + std::string(name(solved.termination)),
                   report);
-  if (!field) return refuse(ScanVerdict::kFailed, "next to no point of the scan lies on the fitted model", report);
-  if (const auto fault = faultOf(*scans.model.topology(), scans.at_rest ? field->rest : vertices))
+  if (!field)
+    return refuse(ScanVerdict::kFailed,
+                  "next to no point of the scan lies on the fitted model, or the field overflows on it", report);
+  if (const auto fault = faultOf(*scans.model.topology(), field->rest))
     return refuse(ScanVerdict::kFailed, "the field made no shape of it: " + *fault, report);
   if (report.score < scans.registration.least_score)
     refuse(ScanVerdict::kDoubtful, "only " + percent(report.score) + " of the scan lies on the registered surface",
@@ -65,13 +66,13 @@ std::optional<FittedScan> RoundScans::fit(std::size_t scan, int round) const {
   return fitted;
 }
 
-Vertices RoundScans::surface(const FittedScan& fitted) const {
+Vertices RoundScans::restSurface(const FittedScan& fitted) const {
   const auto scan = scans.load(fitted.report.scan);
   const ScanSurface ready(preparedScan(scan, registration.unit_factor));
   auto deformed = registration.field->deform(model, fitted.state, ready);
   if (!deformed)
     throw InvalidInput("scans", "\"" + fitted.report.name + "\" is no longer the scan that was registered");
-  return at_rest ? std::move(deformed->rest) : std::move(deformed->posed);
+  return std::move(deformed->rest);
 }
 
 std::vector<std::size_t> scansToTry(std::size_t count, const std::vector<BootstrapRound>& rounds,

@@ -12,13 +12,12 @@ struct RoundScans {
   const ScanSource& scans;
   const BodyModel& model;
   ScanRegistrationOptions registration;  ///< with the field and the stop token
-  bool at_rest;                          ///< whether surfaces are learned from at rest, or as they lie on their scans
 
   /// Registers a scan and says how that went. Nothing once the stop token has fired.
   std::optional<FittedScan> fit(std::size_t scan, int round) const;
-  /// X' of a scan that was fitted, V x 3, the same bits as when it was. Throws InvalidInput when the scan is not what
-  /// it was.
-  Vertices surface(const FittedScan& fitted) const;
+  /// X' at rest of a scan that was fitted, V x 3, the same bits as when it was. Throws InvalidInput when the scan is
+  /// not what it was.
+  Vertices restSurface(const FittedScan& fitted) const;
 };
 
 /// The scans that a round tries, ascending: those that have neither joined nor turned out to be unusable in the rounds

@@ -119,7 +119,9 @@ std::optional<DeformedBody> FieldDeformation::deform(const BodyModel& model, con
   const Scan seen = scanAtRest(model, state, scan);
   if (seen.points.rows() < kFewestScanPoints) return std::nullopt;
   const auto features = jacobianFieldFeatures(*reference_, model.rest(state.identity), seen, field_.weights().scaling);
-  Vertices rest = field_.deform(poisson, features);
+  const auto jacobians = field_.predict(features);
+  if (!jacobians.allFinite()) return std::nullopt;
+  Vertices rest = poisson.solve(jacobians, features.centroids);
   Vertices posed =
       PosedSkin(model.skeleton(), model.parts().weights, rest, model.restJoints(state.identity), state.pose).vertices();
   return DeformedBody{std::move(rest), std::move(posed)};

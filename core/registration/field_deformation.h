@@ -47,8 +47,9 @@ class FieldDeformation {
   /// places: at rest each component stays centred where it is in X_o. Then the bones of the fit carry it as they carry
   /// X_o: about X_o's joints, so that what the field brought onto the scan at rest comes to lie on the scan.
   ///
-  /// Nothing when fewer than kFewestScanPoints points of the scan come to rest. Throws InvalidInput naming `model` when
-  /// its topology is not the field's reference's, or `state`.
+  /// Nothing when fewer than kFewestScanPoints points of the scan come to rest, or the field's single precision
+  /// overflows on what it sees. Throws InvalidInput naming `model` when its topology is not the field's reference's, or
+  /// `state`.
   std::optional<DeformedBody> deform(const BodyModel& model, const BodyState& state, const ScanSurface& scan) const;
 
   const JacobianFieldWeights& weights() const { return field_.weights(); }

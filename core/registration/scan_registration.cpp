@@ -84,7 +84,9 @@ void addWarnings(const ScanRegistrationOptions& options, const Outcome& outcome,
     warnings.push_back("the scan shows " + percent(result.report.seen) +
                        " of the surface alone: the rest is the model's guess");
   if (options.field && !result.field)
-    warnings.push_back("the model's field deformed nothing, as the fit failed or next to no point lies on it");
+    warnings.push_back(
+        "the model's field deformed nothing: the fit failed, next to no point of the scan lies on it, or the field "
+        "overflows");
   if (result.field && result.field->report.chamfer > result.report.chamfer)
     warnings.push_back("the model's field brought the surface no nearer to the scan");
 }

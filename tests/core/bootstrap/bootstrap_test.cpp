@@ -116,32 +116,29 @@ TEST_CASE("a bootstrap grows its model by the scans that its registrations lie n
   CHECK_THAT(progress.back().stage, Contains("last model"));
 }
 
-TEST_CASE("registrations of a bootstrap lie on the bodies that were scanned, or at rest where postures are kept") {
-  auto set = sharedSet();
+TEST_CASE("what joins is the surface at rest, and posed lies on the body that was scanned") {
+  const auto& set = sharedSet();
   const auto& faces = set.inputs.reference.topology->faces();
-  const auto checkAll = [&](const Bootstrapped& grown, const std::function<double(const Vertices&, std::size_t)>& error,
-                            double most) {
-    std::size_t at = 0;
-    for (const auto& scan : grown.rounds.front().scans) {
-      if (scan.verdict != ScanVerdict::kJoined) continue;
-      INFO(scan.name);
-      CHECK(error(grown.joined.at(at++), scan.scan) < most);
-    }
-    CHECK(at == grown.rounds.front().joined);
-  };
-  const auto inPlace = [&](const Vertices& shape, std::size_t scan) {
-    return distancesToSurface(shape, set.truths[scan], faces).mean();
-  };
-  checkAll(*sharedRun().grown, inPlace, 3.5e-3);  // of a creature one metre long and a model of three modes
-
-  set.options.posture = PostureNormalisation::kNone;
-  set.options.rounds = 1;
-  const auto grown = bootstrapBody(set.inputs, trainPullField, set.options);
-  REQUIRE(grown);
-  const auto atRest = [&](const Vertices& shape, std::size_t) {
-    return (shape - set.inputs.reference.rest).colwise().mean().norm();
-  };
-  checkAll(*grown, atRest, 0.03);
+  // The first round by hand: its model and its field, which the checkpoint after the training has.
+  BodyTrainingOptions training;
+  training.modes = set.options.modes;
+  const auto model = trainBody(set.inputs.reference, set.inputs.registrations, training)->model;
+  const auto& states = sharedRun().states;
+  const auto trained = std::find_if(states.begin(), states.end(), [](const auto& state) { return state.field; });
+  REQUIRE(trained != states.end());
+  auto registration = set.options.registration;
+  registration.field = FieldDeformation::make(model, *trained->field);
+  std::size_t at = 0;
+  for (const auto& scan : sharedRun().rounds.front().scans) {
+    if (scan.verdict != ScanVerdict::kJoined) continue;
+    INFO(scan.name);
+    const auto registered = registerScan(set.inputs.scans.load(scan.scan), model, {}, registration).solution;
+    REQUIRE(registered.field);
+    CHECK(sharedRun().grown->joined.at(at++) == registered.field->rest);
+    // Of a creature one metre long and a model of three modes.
+    CHECK(distancesToSurface(registered.vertices, set.truths[scan.scan], faces).mean() < 3.5e-3);
+  }
+  CHECK(at == sharedRun().rounds.front().joined);
 }
 
 TEST_CASE("a bootstrap resumed from any checkpoint gives the same bits") {
@@ -300,7 +297,9 @@ TEST_CASE("faces go the same way as bodies: without a rig") {
   CHECK(grown->model.skeleton().jointCount() == 1);
   const auto& found = grown->rounds[0].scans[0];
   CHECK(found.chamfer < 1.05 * found.model_chamfer);
-  CHECK(distancesToSurface(grown->joined[0], bodies.inputs.registrations[4], topology->faces()).mean() < 0.01);
+  const auto& truth = bodies.inputs.registrations[4];
+  const Vertices placed = apply(alignRigidly(grown->joined[0], truth), grown->joined[0]);
+  CHECK(distancesToSurface(placed, truth, topology->faces()).mean() < 0.01);
 }
 
 TEST_CASE("a bootstrap says what it cannot work on") {

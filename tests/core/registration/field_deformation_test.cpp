@@ -168,6 +168,9 @@ TEST_CASE("a field needs points of the scan, and a model of its topology") {
   Scan elsewhere = tube.scan(2000);
   elsewhere.points.array() += 5;
   CHECK_FALSE(field.deform(tube.model, tube.state, ScanSurface(elsewhere)));
+  auto overflowing = field.weights();
+  overflowing.mlp[0].weight.setConstant(3e38F);
+  CHECK_FALSE(FieldDeformation(reference, overflowing).deform(tube.model, tube.state, ScanSurface(tube.scan(2000))));
   BodyParts parts = tube.model.parts();
   parts.topology =
       std::make_shared<const Topology>(parts.topology->vertexCount(), Faces(tube.faces.colwise().reverse()));
