@@ -48,7 +48,8 @@ std::string scanText(const v1::BootstrapScan& scan, int name_width) {
   const bool joined = scan.verdict() == v1::SCAN_VERDICT_JOINED;
   char numbers[320];
   std::snprintf(numbers, sizeof numbers, "  %-*.200s  %-8s  round %-3u  %9.2f mm  score %.2f", name_width,
-                scan.name().c_str(), shapectl::nameOf(scan.verdict()).c_str(), scan.round(), 1000 * scan.chamfer(), scan.score());
+                scan.name().c_str(), shapectl::nameOf(scan.verdict()).c_str(), scan.round(), 1000 * scan.chamfer(),
+                scan.score());
   return numbers + (joined || scan.why().empty() ? "" : "  " + scan.why()) + "\n";
 }
 
@@ -86,9 +87,9 @@ nlohmann::json BootstrapOutput::document() const {
   return document;
 }
 
-std::string BootstrapOutput::text() const {
-  auto text = roundHeading();
-  for (const auto& round : rounds_) text += roundText(round);
+std::string BootstrapOutput::text(std::size_t told) const {
+  std::string text = told == 0 ? roundHeading() : "";
+  for (auto i = told; i < rounds_.size(); ++i) text += roundText(rounds_[i]);
   int width = 4;
   for (const auto& [index, scan] : scans_) width = std::max(width, static_cast<int>(scan.name().size()));
   width = std::min(width, 40);

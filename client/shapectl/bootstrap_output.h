@@ -22,8 +22,8 @@ class BootstrapOutput {
 
   /// {"rounds": [...], "scans": [...], "end": "few_joined"}
   nlohmann::json document() const;
-  /// Tables of rounds and of scans, and why it ended.
-  std::string text() const;
+  /// Tables of rounds and of scans, and why it ended. told: the first rounds, which stand there already.
+  std::string text(std::size_t told = 0) const;
 
   static std::string roundHeading();
   /// A line of the table of rounds.

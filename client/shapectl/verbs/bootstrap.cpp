@@ -18,20 +18,40 @@
 namespace shaped::shapectl {
 namespace {
 
-/// Writes each scan down as it is registered, and again when its round has ended: one JSON object a line.
-class ScanLog {
+/// Tells what happens while it does: rounds to the terminal, and to a file each scan as it is registered, and again
+/// when its round has ended, one JSON object a line.
+class LiveOutput {
  public:
-  explicit ScanLog(const std::string& file) {
-    if (file.empty()) return;
-    out_.open(file);
-    if (!out_) throw InvalidInput("--log", file + " cannot be written");
-  }
-  void add(const v1::BootstrapScan& scan) {
-    if (out_.is_open()) out_ << toJson(scan).dump() << std::endl;
+  LiveOutput(bool rounds, const std::string& log) : tells_rounds_(rounds) {
+    if (log.empty()) return;
+    log_.open(log);
+    if (!log_) throw InvalidInput("--log", log + " cannot be written");
   }
 
+  void hear(const v1::WatchJobResponse& news, ProgressBar& bar) {
+    for (const auto& scan : news.bootstrap_scans()) write(scan);
+    for (const auto& round : news.bootstrap_rounds()) {
+      for (const auto& scan : round.scans()) write(scan);
+      if (tells_rounds_) tell(round, bar);
+    }
+  }
+
+  /// Rounds that stand on the terminal.
+  std::size_t told() const { return told_; }
+
  private:
-  std::ofstream out_;
+  void write(const v1::BootstrapScan& scan) {
+    if (log_.is_open()) log_ << toJson(scan).dump() << std::endl;
+  }
+  void tell(const v1::BootstrapRound& round, ProgressBar& bar) {
+    bar.clear();
+    if (told_++ == 0) std::cout << BootstrapOutput::roundHeading();
+    std::cout << BootstrapOutput::roundText(round) << std::flush;
+  }
+
+  const bool tells_rounds_;
+  std::size_t told_ = 0;
+  std::ofstream log_;
 };
 
 struct Bootstrap {
@@ -76,7 +96,7 @@ struct Bootstrap {
   ExitCode run(const Session& session) const {
     if (detach && !log.empty()) throw InvalidInput("--log", "goes without --detach: nobody would write it");
     auto request = requestOf();
-    ScanLog scan_log(log);
+    LiveOutput live(!session.json, log);
     const auto channel = session.channel();
     const auto jobs = v1::Jobs::NewStub(channel);
     v1::Job job;
@@ -85,11 +105,11 @@ struct Bootstrap {
       addShapes(channel, session, bar, request);
       addScans(channel, session, bar, *request.mutable_bootstrap());
       job = client::startTraining(*jobs, request, session.callOptions());
-      if (!detach)
-        job = follow(*jobs, job, session, bar, [&](const auto& news) { hear(news, session, bar, scan_log); });
+      if (!detach) job = follow(*jobs, job, session, bar, [&](const auto& news) { live.hear(news, bar); });
     }
     if (detach) return printStarted(job, session);
-    return job.state() == v1::JOB_STATE_SUCCEEDED ? printGrown(*jobs, job, session) : printEnded(job, session);
+    if (job.state() != v1::JOB_STATE_SUCCEEDED) return printEnded(job, session);
+    return printGrown(*jobs, job, live.told(), session);
   }
 
  private:
@@ -158,18 +178,7 @@ struct Bootstrap {
     if (!field_scans.empty()) bootstrap.set_field_scans(upload("--field-scans", field_scans));
   }
 
-  static void hear(const v1::WatchJobResponse& news, const Session& session, ProgressBar& bar, ScanLog& scan_log) {
-    for (const auto& scan : news.bootstrap_scans()) scan_log.add(scan);
-    for (const auto& round : news.bootstrap_rounds()) {
-      for (const auto& scan : round.scans()) scan_log.add(scan);
-      if (session.json) continue;
-      bar.clear();
-      if (round.round() == 1) std::cout << BootstrapOutput::roundHeading();
-      std::cout << BootstrapOutput::roundText(round) << std::flush;
-    }
-  }
-
-  static ExitCode printGrown(v1::Jobs::Stub& jobs, const v1::Job& job, const Session& session) {
+  static ExitCode printGrown(v1::Jobs::Stub& jobs, const v1::Job& job, std::size_t told, const Session& session) {
     BootstrapOutput output;
     client::fetchResult(jobs, job.id(), session.callOptions(),
                         [&](const auto& answer) { output.add(answer.bootstrap_round()); });
@@ -178,7 +187,7 @@ struct Bootstrap {
     if (session.json)
       printJson(document);
     else
-      std::cout << "\n" << output.text() << jobText(job) << "\n";
+      std::cout << output.text(told) << jobText(job) << "\n";
     return ExitCode::kSuccess;
   }
 };
