@@ -1,31 +1,12 @@
 #include "client/dataset_upload.h"
 
-#include <algorithm>
-#include <cctype>
-
+#include "client/fingerprint.h"
 #include "client/mesh.h"
 #include "client/sending.h"
 #include "core/numerics/error.h"
 
 namespace shaped::client {
 namespace {
-
-/// FNV-1a over 64 bits: tells contents apart, no more.
-class Fingerprint {
- public:
-  void add(const void* data, std::size_t size) {
-    for (const auto* byte = static_cast<const unsigned char*>(data); size > 0; --size, ++byte)
-      value_ = (value_ ^ *byte) * 1099511628211ULL;
-  }
-  std::string text() const {
-    std::string digits;
-    for (int shift = 60; shift >= 0; shift -= 4) digits.push_back("0123456789abcdef"[(value_ >> shift) & 15]);
-    return digits;
-  }
-
- private:
-  std::uint64_t value_ = 14695981039346656037ULL;
-};
 
 v1::UploadDatasetRequest headerOf(const std::string& name, const ShapeSource& shapes) {
   v1::UploadDatasetRequest message;
@@ -75,21 +56,16 @@ Vertices ShapeSource::shape(std::int64_t index) const {
 }
 
 std::string contentName(const ShapeSource& shapes, const std::string& prefix) {
-  constexpr std::size_t longest_prefix = 70;  // names have at most 100 characters
   Fingerprint fingerprint;
-  fingerprint.add(shapes.faces().data(), sizeof(std::int32_t) * static_cast<std::size_t>(shapes.faces().size()));
+  fingerprint.addAll(shapes.faces().data(), static_cast<std::size_t>(shapes.faces().size()));
   const auto addShape = [&](const Vertices& shape) {
     google::protobuf::RepeatedField<float> packed;
     pack(shape, packed);
-    fingerprint.add(packed.data(), sizeof(float) * static_cast<std::size_t>(packed.size()));
+    fingerprint.addAll(packed.data(), static_cast<std::size_t>(packed.size()));
   };
   if (shapes.templateShape()) addShape(*shapes.templateShape());
   for (std::int64_t i = 0; i < shapes.count(); ++i) addShape(shapes.shape(i));
-  std::string name = prefix.substr(0, longest_prefix);
-  // Whether the model's name will do is for the daemon to say, of the model.
-  std::replace_if(
-      name.begin(), name.end(), [](unsigned char c) { return std::isalnum(c) == 0; }, '_');
-  return "shapes-" + name + "-" + fingerprint.text();
+  return datasetName("shapes", prefix, fingerprint);
 }
 
 v1::Dataset uploadDataset(const std::shared_ptr<grpc::Channel>& channel, const std::string& name,

@@ -14,14 +14,21 @@ v1::Job getJob(v1::Jobs::Stub& jobs, const std::string& id, const CallOptions& o
 }
 
 v1::Job watchJob(v1::Jobs::Stub& jobs, const std::string& id, const CallOptions& options,
-                 const std::function<void(const v1::Job&)>& update) {
+                 const std::function<void(const v1::WatchJobResponse&)>& update) {
   Call call(options);
   v1::WatchJobRequest request;
   request.set_id(id);
   const auto stream = jobs.Watch(call.context(), request);
   v1::WatchJobResponse response;
-  while (stream->Read(&response)) update(response.job());
+  while (stream->Read(&response)) update(response);
   require(stream->Finish());
+  return response.job();
+}
+
+v1::Job startTraining(v1::Jobs::Stub& jobs, const v1::TrainRequest& request, const CallOptions& options) {
+  Call call(options);
+  v1::TrainResponse response;
+  require(jobs.Train(call.context(), request, &response));
   return response.job();
 }
 

@@ -13,10 +13,14 @@ namespace shaped::client {
 /// Throws RpcError when there is no such job.
 v1::Job getJob(v1::Jobs::Stub& jobs, const std::string& id, const CallOptions& options);
 
-/// Follows a job until it has ended and returns its last state; `update` sees every state on the way.
+/// Follows a job until it has ended and returns its last state; `update` sees every state on the way, and what the job
+/// tells of its scans.
 /// Throws RpcError when the call fails or is aborted by the options; the job itself goes on.
 v1::Job watchJob(v1::Jobs::Stub& jobs, const std::string& id, const CallOptions& options,
-                 const std::function<void(const v1::Job&)>& update);
+                 const std::function<void(const v1::WatchJobResponse&)>& update);
+
+/// Starts a training. Throws RpcError when the daemon refuses.
+v1::Job startTraining(v1::Jobs::Stub& jobs, const v1::TrainRequest& request, const CallOptions& options);
 
 /// Start batch jobs. Throw RpcError when the daemon refuses.
 v1::Job startEvaluation(v1::Jobs::Stub& jobs, const v1::EvaluateJobRequest& request, const CallOptions& options);

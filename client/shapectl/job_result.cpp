@@ -18,11 +18,13 @@ void JobResultOutput::add(const v1::GetJobResultResponse& answer) {
   if (answer.has_evaluate()) evaluation_ = answer.evaluate();
   if (answer.has_fit_markers()) addFit(answer.fit_markers());
   if (answer.has_project()) addProjection(answer.project());
+  if (answer.has_bootstrap_round()) bootstrap_.add(answer.bootstrap_round());
 }
 
 void JobResultOutput::addShape(const v1::Shape& shape) {
   if (files_.out.empty()) return;
-  if (shape.positions().empty()) throw InvalidInput("--out", "the job was asked to leave the shapes out of its answers");
+  if (shape.positions().empty())
+    throw InvalidInput("--out", "the job was asked to leave the shapes out of its answers");
   if (!shapes_) shapes_.emplace(files_.out);
   shapes_->append(client::unpack(shape.positions()));
 }
@@ -50,10 +52,20 @@ ExitCode JobResultOutput::finish(const Session& session) {
     printEvaluation(*evaluation_, session);
     return exitCodeOf(evaluation_->report());
   }
+  if (!bootstrap_.empty()) return finishBootstrap(session);
   if (!fit_) return finishProjections(session);
   if (!files_.report.empty()) fit_->write(files_.report);
   fit_->print(session);
   return exitCodeOf(fit_->solver());
+}
+
+ExitCode JobResultOutput::finishBootstrap(const Session& session) const {
+  if (!files_.report.empty()) writeFile(files_.report, bootstrap_.document().dump(2) + "\n");
+  if (session.json)
+    printJson(bootstrap_.document());
+  else
+    std::cout << bootstrap_.text();
+  return ExitCode::kSuccess;
 }
 
 ExitCode JobResultOutput::finishProjections(const Session& session) const {

@@ -5,6 +5,7 @@
 #include <string>
 #include <vector>
 
+#include "client/shapectl/bootstrap_output.h"
 #include "client/shapectl/exit_code.h"
 #include "client/shapectl/fit_report.h"
 #include "client/shapectl/session.h"
@@ -35,6 +36,7 @@ class JobResultOutput {
   void addFit(const v1::FitMarkersResponse& response);
   void addProjection(const v1::ProjectResponse& response);
   void addShape(const v1::Shape& shape);
+  ExitCode finishBootstrap(const Session& session) const;
   ExitCode finishProjections(const Session& session) const;
 
   const ResultFiles files_;
@@ -42,6 +44,7 @@ class JobResultOutput {
   std::optional<FrameWriter> shapes_;
   std::optional<v1::EvaluateResponse> evaluation_;
   std::optional<FitReport> fit_;
+  BootstrapOutput bootstrap_;
   SolverTally projections_;
   nlohmann::json projection_documents_ = nlohmann::json::array();
 };

@@ -9,8 +9,8 @@ namespace shaped::shapectl {
 namespace {
 
 client::RpcError daemonGone(const v1::Job& job, const client::RpcError& error) {
-  return client::RpcError({error.code(), std::string(error.what()) + "; job " + job.id() + " is kept: `shapectl watch " +
-                                             job.id() + "` follows it again"});
+  return client::RpcError({error.code(), std::string(error.what()) + "; job " + job.id() +
+                                             " is kept: `shapectl watch " + job.id() + "` follows it again"});
 }
 
 }  // namespace
@@ -20,8 +20,12 @@ void JobFlags::declare(Arguments& arguments) {
   arguments.flag("--detach", detach, "As a job that is left to itself: `shapectl watch JOB`, `shapectl result JOB`");
 }
 
-v1::Job follow(v1::Jobs::Stub& jobs, const v1::Job& job, const Session& session, ProgressBar& bar) {
-  const auto draw = [&bar](const v1::Job& state) { show(bar, state); };
+v1::Job follow(v1::Jobs::Stub& jobs, const v1::Job& job, const Session& session, ProgressBar& bar,
+               const std::function<void(const v1::WatchJobResponse&)>& news) {
+  const auto draw = [&](const v1::WatchJobResponse& state) {
+    if (news) news(state);
+    show(bar, state.job());
+  };
   try {
     return client::watchJob(jobs, job.id(), session.callOptions(), draw);
   } catch (const client::RpcError& error) {

@@ -21,8 +21,9 @@ struct JobFlags {
 };
 
 /// Follows a job until it ends. Nobody waits for it any more once that is broken off by Ctrl-C or --timeout: it is
-/// cancelled. When the daemon goes away, the job stays: it goes on with the next start.
-v1::Job follow(v1::Jobs::Stub& jobs, const v1::Job& job, const Session& session, ProgressBar& bar);
+/// cancelled. When the daemon goes away, the job stays: it goes on with the next start. news: hears what it tells.
+v1::Job follow(v1::Jobs::Stub& jobs, const v1::Job& job, const Session& session, ProgressBar& bar,
+               const std::function<void(const v1::WatchJobResponse&)>& news = {});
 
 /// Starts a batch job; detached, prints it; else follows it and gives its result to the output.
 ExitCode runBatch(const Session& session, const JobFlags& flags, JobResultOutput& output,

@@ -69,6 +69,8 @@ nlohmann::json toJson(const v1::ModelDescription::Body& body) {
           {"joints", joints},
           {"limits", body.limits()},
           {"posture", nameOf(body.posture())},
+          {"field", body.field()},
+          {"joined", body.joined()},
           {"variances", body.variances()}};
 }
 

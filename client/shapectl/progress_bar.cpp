@@ -9,7 +9,9 @@ namespace shaped::shapectl {
 
 ProgressBar::ProgressBar() : enabled_(isatty(STDERR_FILENO) != 0) {}
 
-ProgressBar::~ProgressBar() {
+ProgressBar::~ProgressBar() { clear(); }
+
+void ProgressBar::clear() {
   if (enabled_) std::cerr << "\r\x1b[K" << std::flush;
 }
 

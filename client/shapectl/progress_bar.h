@@ -14,6 +14,8 @@ class ProgressBar {
 
   /// fraction in [0, 1]; the text stands behind the bar.
   void show(double fraction, const std::string& text);
+  /// Makes room for a line of something else.
+  void clear();
 
  private:
   bool enabled_;

@@ -40,6 +40,7 @@ nlohmann::json registrationDocument(const v1::RegisterResponse& response) {
   if (response.suspected_unit_factor() > 0) document["suspected_unit_factor"] = response.suspected_unit_factor();
   document["score"] = response.score();
   document["warnings"] = response.warnings();
+  if (response.has_field_report()) document["field_report"] = toJson(response.field_report());
   if (response.has_refinement()) document["refinement"] = toJson(response.refinement());
   return document;
 }
@@ -54,6 +55,11 @@ std::string registrationText(const v1::RegisterResponse& response) {
       1000 * report.scan_median(), 1000 * report.scan_95(), 100 * report.explained(), 100 * report.seen(),
       response.score());
   auto text = answerText(response) + numbers;
+  if (response.has_field_report()) {
+    std::snprintf(numbers, sizeof numbers, "deformed by the model's field: chamfer distance %.2f mm, %.2f mm before\n",
+                  1000 * response.field_report().chamfer(), 1000 * report.chamfer());
+    text += numbers;
+  }
   for (const auto& warning : response.warnings()) text += "warning: " + warning + "\n";
   return text;
 }

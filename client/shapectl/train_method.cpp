@@ -75,28 +75,31 @@ class BodyMethod final : public TrainMethod {
     options.set_modes(modes);
     options.set_explained(explained_);
     options.set_reach(reach_);
-    options.set_posture(posture());
-    if (rig_.empty()) return;
-    readRig(rig_, static_cast<std::int32_t>(shapes.vertexCount()));  // says here what is wrong with the file
-    options.set_rig(readFile(rig_));
+    options.set_posture(postureNamed(posture_));
+    if (!rig_.empty()) options.set_rig(rigText(rig_, shapes.vertexCount()));
   }
 
  private:
-  v1::PostureNormalisation posture() const {
-    static const std::map<std::string, v1::PostureNormalisation> names{{"", v1::POSTURE_NORMALISATION_UNSPECIFIED},
-                                                                       {"none", v1::POSTURE_NORMALISATION_NONE},
-                                                                       {"skeleton", v1::POSTURE_NORMALISATION_SKELETON},
-                                                                       {"local", v1::POSTURE_NORMALISATION_LOCAL}};
-    const auto found = names.find(posture_);
-    if (found == names.end()) throw InvalidInput("--posture", "is \"" + posture_ + "\", want none, skeleton or local");
-    return found->second;
-  }
-
   std::string rig_, posture_;
   double explained_ = 0, reach_ = 0;
 };
 
 }  // namespace
+
+v1::PostureNormalisation postureNamed(const std::string& text) {
+  static const std::map<std::string, v1::PostureNormalisation> names{{"", v1::POSTURE_NORMALISATION_UNSPECIFIED},
+                                                                     {"none", v1::POSTURE_NORMALISATION_NONE},
+                                                                     {"skeleton", v1::POSTURE_NORMALISATION_SKELETON},
+                                                                     {"local", v1::POSTURE_NORMALISATION_LOCAL}};
+  const auto found = names.find(text);
+  if (found == names.end()) throw InvalidInput("--posture", "is \"" + text + "\", want none, skeleton or local");
+  return found->second;
+}
+
+std::string rigText(const std::string& file, Eigen::Index vertex_count) {
+  readRig(file, static_cast<std::int32_t>(vertex_count));  // says here what is wrong with the file
+  return readFile(file);
+}
 
 std::vector<std::unique_ptr<TrainMethod>> trainMethods() {
   std::vector<std::unique_ptr<TrainMethod>> methods;

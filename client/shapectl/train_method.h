@@ -23,6 +23,11 @@ class TrainMethod {
   virtual void fill(const client::ShapeSource& shapes, std::uint32_t modes, v1::TrainRequest& request) const = 0;
 };
 
+/// Of --posture, "" for none given. Throws InvalidInput.
+v1::PostureNormalisation postureNamed(const std::string& text);
+/// A rig file as it travels. Throws InvalidInput naming the file and what is wrong in it for such a mesh.
+std::string rigText(const std::string& file, Eigen::Index vertex_count);
+
 /// All of them, the one that is named first in the help first.
 std::vector<std::unique_ptr<TrainMethod>> trainMethods();
 

@@ -114,7 +114,7 @@ void requireRegression(const ResidualRegressionWeights& weights, const BodyModel
 
 std::optional<JacobianFieldWeights> fieldFrom(const ModelManifest& manifest, const TensorFile& tensors,
                                               const BodyModel& model) {
-  if (manifest.format_version != kFieldVersion) return std::nullopt;
+  if (!holdsField(manifest)) return std::nullopt;
   auto weights = readJacobianField(tensors, kField);
   const JacobianField complete(weights);  // says what does not fit
   if (weights.regression) requireRegression(*weights.regression, model);
@@ -178,6 +178,10 @@ void requireBody(const ModelManifest& manifest) {
     throw InvalidInput("manifest", "has format version " + std::to_string(manifest.format_version) + ", want " +
                                        std::to_string(kPlainVersion) + " or " + std::to_string(kFieldVersion) +
                                        "; train it again or use the daemon that wrote it");
+}
+
+bool holdsField(const ModelManifest& manifest) {
+  return manifest.kind == kBodyKind && manifest.format_version == kFieldVersion;
 }
 
 StoredBody bodyFrom(const ModelManifest& manifest, const TensorFile& tensors) try {

@@ -41,6 +41,9 @@ std::int64_t publishBody(const ModelDirectory& directory, const std::string& nam
 /// Throws InvalidInput naming "manifest" when the kind or format version is none that bodyFrom() reads.
 void requireBody(const ModelManifest& manifest);
 
+/// Whether a model's files hold a field, from its manifest alone.
+bool holdsField(const ModelManifest& manifest);
+
 /// Builds the model out of its files. Throws InvalidInput when kind or format version is another, the description or a
 /// tensor is missing or of another type or shape, or BodyModel refuses what they hold; also when the mean is no valid
 /// shape, the modes are not orthonormal, deviations and variances do not fall, or JacobianField refuses the field.

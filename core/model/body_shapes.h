@@ -18,6 +18,8 @@ class BodyShapes final : public ShapeModel {
   BodyShapes(BodyModel model, BodyTrainingRecord training, std::optional<JacobianFieldWeights> field = std::nullopt);
   const BodyModelPtr& model() const { return model_; }
   const BodyTrainingRecord& training() const { return training_; }
+  /// The mean at rest and its rig, as a template that registrations are normalised to.
+  const PostureTemplate& reference() const { return reference_; }
   bool hasField() const { return field_.has_value(); }
   /// What registerScan deforms this model's fits with. Made when first asked for, which takes about a second for each
   /// 10,000 vertices; warm() and bytes() ask. Null without a field, or once the stop token has fired.

@@ -71,9 +71,10 @@ void describe(const nlohmann::json& json, v1::ModelDescription::ShellPga& pga) {
   pga.set_path_energy(pathEnergyOf(textIn(json, "path_energy") == "symmetric"));
 }
 
-void describe(const nlohmann::json& json, v1::ModelDescription::Body& body) {
-  body.set_training_shapes(countIn(json, "training_shapes"));
-  body.set_modes(countIn(json, "modes"));
+void describe(const ModelManifest& manifest, v1::ModelDescription::Body& body) {
+  body.set_training_shapes(countIn(manifest.description, "training_shapes"));
+  body.set_modes(countIn(manifest.description, "modes"));
+  body.set_field(holdsField(manifest));
 }
 
 void describe(const ShellPgaModel& model, v1::ModelDescription& description) {
@@ -102,9 +103,10 @@ void describe(const BodyShapes& shapes, v1::ModelDescription& description) {
     message.set_parent(joint.parent);
   }
   body.set_limits(parts.limits.has_value());
-  for (const auto& [wire, posture] : kPostures)
-    if (posture == training.posture && wire != v1::POSTURE_NORMALISATION_UNSPECIFIED) body.set_posture(wire);
+  body.set_posture(server::toProto(training.posture));
   for (const double value : training.variances) body.add_variances(value);
+  body.set_field(shapes.hasField());
+  for (const int joined : training.joined) body.add_joined(static_cast<std::uint32_t>(joined));
 }
 
 SubmanifoldPoint submanifoldPoint(const v1::Coefficients& coefficients) {
@@ -141,7 +143,7 @@ void toProto(const ModelStore::Entry& entry, v1::ModelDescription& description) 
   description.set_vertex_count(countIn(json, "vertices"));
   description.set_face_count(countIn(json, "faces"));
   if (entry.manifest.kind == kShellPgaKind) describe(json, *description.mutable_shell_pga());
-  if (entry.manifest.kind == kBodyKind) describe(json, *description.mutable_body());
+  if (entry.manifest.kind == kBodyKind) describe(entry.manifest, *description.mutable_body());
   description.set_state(stateOf(entry.state));
   description.set_memory_bytes(entry.bytes);
   toProto(entry.standing, description);
@@ -177,6 +179,12 @@ PostureNormalisation postureFromProto(v1::PostureNormalisation wanted, const std
   for (const auto& [wire, posture] : kPostures)
     if (wire == wanted) return posture;
   throw InvalidInput(field, std::to_string(wanted) + " is no PostureNormalisation");
+}
+
+v1::PostureNormalisation toProto(PostureNormalisation posture) {
+  for (const auto& [wire, one] : kPostures)
+    if (one == posture && wire != v1::POSTURE_NORMALISATION_UNSPECIFIED) return wire;
+  return v1::POSTURE_NORMALISATION_UNSPECIFIED;
 }
 
 void toProto(const ShapeScore& score, v1::Score& message) {

@@ -24,6 +24,7 @@ void toProto(const ShapeScore& score, v1::Score& message);
 
 /// Throws InvalidInput naming `field`.
 PostureNormalisation postureFromProto(v1::PostureNormalisation posture, const std::string& field);
+v1::PostureNormalisation toProto(PostureNormalisation posture);
 
 /// Throws InvalidInput naming `field` when the number is above `most`.
 int countFromProto(std::uint32_t value, int most, const std::string& field);

@@ -51,13 +51,13 @@ Anchor pointFromProto(const v1::MarkerSet::FacePoint& message, const Topology& t
 
 }  // namespace
 
-Scan scanFromProto(const v1::Scan& message, const Limits& limits) {
+Scan scanFromProto(const v1::Scan& message, const Limits& limits, const std::string& field) {
   const std::int64_t count = message.positions_size() / 3;
-  requireAtMost(count, limits.vertices, "scan.positions", "points");
+  requireAtMost(count, limits.vertices, field + ".positions", "points");
   Scan scan;
-  scan.points = pointsFromProto(message.positions(), count, "scan.positions");
-  if (!message.normals().empty()) scan.normals = pointsFromProto(message.normals(), count, "scan.normals");
-  if (!message.faces().empty()) scan.faces = facesFromProto(message.faces(), count, limits, "scan.faces");
+  scan.points = pointsFromProto(message.positions(), count, field + ".positions");
+  if (!message.normals().empty()) scan.normals = pointsFromProto(message.normals(), count, field + ".normals");
+  if (!message.faces().empty()) scan.faces = facesFromProto(message.faces(), count, limits, field + ".faces");
   return scan;
 }
 

@@ -8,9 +8,9 @@
 
 namespace shaped::server {
 
-/// Throws InvalidInput naming `scan`'s field and the index: counts that do not fit, more points or faces than the
-/// limits allow, an index out of range. Whether the points make a surface is for the core to say.
-Scan scanFromProto(const v1::Scan& message, const Limits& limits);
+/// field: what errors call it. Throws InvalidInput naming its field and the index: counts that do not fit, more points
+/// or faces than the limits allow, an index out of range. Whether the points make a surface is for the core to say.
+Scan scanFromProto(const v1::Scan& message, const Limits& limits, const std::string& field = "scan");
 
 /// Places on a model, and where they are on the scan, made metres by `unit_factor`. Throws InvalidInput naming
 /// landmarks[i]: no place, one that is not of the topology, weights that are not a point of a face, or a position that

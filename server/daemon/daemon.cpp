@@ -7,6 +7,7 @@
 #include "core/numerics/error.h"
 #include "server/daemon/scrape.h"
 #include "server/daemon/surroundings.h"
+#include "server/field_training/trainer_process.h"
 #include "server/jobs/arena.h"
 #include "server/rpc/job_kinds.h"
 #include "server/security/limits.h"
@@ -56,7 +57,8 @@ Daemon::Daemon(const DaemonOptions& options)
                    metrics_,
                    options_.limits,
                    std::chrono::duration<double>(options.publish_patience),
-                   std::chrono::duration<double>(options.checkpoint_every)},
+                   std::chrono::duration<double>(options.checkpoint_every),
+                   options.trainer.empty() ? defaultTrainer() : options.trainer},
       jobs_(job_registry_, jobKinds(job_context_), jobLimits(options), options.store / "jobs",
             [this](const JobRecord& job) { metrics_.jobEnded(job.kind, nameOf(job.state)); }),
       runtime_{pool_,

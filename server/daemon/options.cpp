@@ -167,6 +167,9 @@ std::vector<OptionSpec> jobOptions() {
           "keep-results-megabytes", "N", When::kAtStart, kMostMegabytes,
           [](auto& o) -> auto& { return o.keep_results; },
           "results of jobs, all together; the oldest are forgotten with their jobs [MiB]", 1 << 20),
+      textOption(
+          "trainer", "FILE", When::kAtStart, [](auto& o) -> auto& { return o.trainer; },
+          "the program that trains the fields of bootstraps; shaped-trainer beside this program where not given"),
   };
 }
 

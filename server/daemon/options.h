@@ -23,9 +23,10 @@ struct DaemonOptions {
   std::size_t keep_jobs = 1000;            ///< ended jobs that are remembered, >= 1
   double keep_jobs_days = 90;              ///< for at most so long [d], >= 0; 0: whatever their age
   std::int64_t keep_results = std::int64_t{10} << 30;  ///< bytes of all results of batch jobs together, >= 1
-  double drain = 0;                        ///< asked to stop: how long it still answers, NOT_SERVING [s], >= 0
-  double grace = 5;                        ///< then: how long running calls may go on [s], >= 0
-  double write_patience = 60;              ///< how long a stream waits for a client to take a message [s], > 0
+  std::filesystem::path trainer;                       ///< the program shaped-trainer; empty: beside this one
+  double drain = 0;            ///< asked to stop: how long it still answers, NOT_SERVING [s], >= 0
+  double grace = 5;            ///< then: how long running calls may go on [s], >= 0
+  double write_patience = 60;  ///< how long a stream waits for a client to take a message [s], > 0
   AdmissionLimits admission;
   double ageing = 10;  ///< how long a request waits until it counts as of the next priority [s], > 0
   SecurityOptions security;

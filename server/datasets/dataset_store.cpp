@@ -1,10 +1,9 @@
 #include "server/datasets/dataset_store.h"
 
 #include <limits>
-#include <nlohmann/json.hpp>
 
 #include "core/io/file.h"
-#include "core/io/json_fields.h"
+#include "core/io/folder.h"
 #include "core/io/npy.h"
 #include "core/io/text_scanner.h"
 #include "core/numerics/error.h"
@@ -16,36 +15,8 @@ namespace {
 
 namespace fs = std::filesystem;
 
-constexpr char kFrames[] = "frames.npy", kFaces[] = "faces.npy", kInfo[] = "dataset.json", kTemplate[] = "template.npy";
-constexpr std::int64_t kLatest = 9'000'000'000;  // seconds since 1970 that the clock's nanoseconds can hold
-constexpr char kScratchPrefix[] = ".scratch-";   // no dataset's name begins with a dot
-
-void writeInfo(const fs::path& folder, const DatasetInfo& info) {
-  const nlohmann::json document{
-      {"name", info.name},
-      {"frames", info.frames},
-      {"vertices", info.vertex_count},
-      {"faces", info.face_count},
-      {"topology_id", info.topology_id},
-      {"created", std::chrono::duration_cast<std::chrono::seconds>(info.created.time_since_epoch()).count()}};
-  writeFile(folder / kInfo, document.dump(2) + "\n");
-}
-
-/// Throws what says that this is no dataset's folder.
-DatasetInfo readInfo(const fs::path& folder) {
-  using Index = std::numeric_limits<std::int32_t>;
-  const auto path = folder / kInfo;
-  const auto document = parseJson(path.string(), readFile(path));
-  const DatasetInfo info{
-      document.at("name"),
-      requireWholeNumber(document, "frames", 1, std::numeric_limits<std::uint32_t>::max()),
-      static_cast<std::int32_t>(requireWholeNumber(document, "vertices", 3, Index::max())),
-      requireWholeNumber(document, "faces", 1, Index::max()),
-      document.at("topology_id"),
-      std::chrono::system_clock::time_point(std::chrono::seconds(requireWholeNumber(document, "created", 0, kLatest)))};
-  if (info.name != folder.filename()) throw InvalidInput(path.string(), "describes a dataset of another name");
-  return info;
-}
+constexpr char kFrames[] = "frames.npy", kFaces[] = "faces.npy", kTemplate[] = "template.npy";
+constexpr char kScratchPrefix[] = ".scratch-";  // no dataset's name begins with a dot
 
 void writeFaces(const fs::path& folder, const Faces& faces) {
   writeNpy(folder / kFaces, {faces.rows(), 3},
@@ -62,8 +33,13 @@ Faces readFaces(const fs::path& folder) {
   return Eigen::Map<const Stored>(array.values.data(), array.shape[0], 3).cast<std::int32_t>();
 }
 
-bool sameContent(const fs::path& one, const fs::path& other) {
-  for (const char* file : {kFaces, kFrames, kTemplate}) {
+std::vector<std::string> filesOf(const DatasetInfo& info) {
+  return info.kind == DatasetKind::kScans ? scanFiles(info.frames)
+                                          : std::vector<std::string>{kFaces, kFrames, kTemplate};
+}
+
+bool sameContent(const DatasetInfo& info, const fs::path& one, const fs::path& other) {
+  for (const auto& file : filesOf(info)) {
     if (fs::exists(one / file) != fs::exists(other / file)) return false;
     if (!fs::exists(one / file)) continue;
     if (fs::file_size(one / file) != fs::file_size(other / file)) return false;
@@ -78,6 +54,39 @@ std::string framePath(std::int64_t index, const std::string& label) {
 
 Corrupted notAsUploaded(const std::string& name) {
   return Corrupted("dataset \"" + name + "\" does not hold what was uploaded; delete it and upload it again");
+}
+
+TopologyPtr readTopology(const DatasetInfo& info, const fs::path& folder) {
+  auto topology = std::make_shared<const Topology>(info.vertex_count, readFaces(folder));
+  if (topology->id() != info.topology_id) throw notAsUploaded(info.name);
+  return topology;
+}
+
+Dataset readShapes(const DatasetInfo& info, const fs::path& folder, TopologyPtr topology) {
+  auto shapes = readFrames(folder / kFrames);
+  if (std::ssize(shapes) != info.frames) throw notAsUploaded(info.name);
+  std::optional<Vertices> template_shape;
+  if (fs::exists(folder / kTemplate)) template_shape = readFrames(folder / kTemplate).front();
+  for (const auto& shape : shapes) requireValidShape(*topology, shape, info.name);
+  if (template_shape) requireValidShape(*topology, *template_shape, info.name);
+  return {std::move(topology), std::move(shapes), std::move(template_shape)};
+}
+
+Corrupted unreadable(const std::string& name, const InvalidInput& error) {
+  return Corrupted("dataset \"" + name + "\" cannot be read: " + error.what());
+}
+
+InvalidInput otherKind(const std::string& field, const DatasetInfo& info) {
+  const bool scans = info.kind == DatasetKind::kScans;
+  return {field, "\"" + info.name + "\" holds " + (scans ? "raw scans" : "shapes of one connectivity") + ", want " +
+                     (scans ? "shapes of one connectivity" : "raw scans")};
+}
+
+/// A second name for a file, or a copy on a disk that gives none.
+void linkOrCopy(const fs::path& file, const fs::path& link) {
+  std::error_code no_links;
+  fs::create_hard_link(file, link, no_links);
+  if (no_links) fs::copy_file(file, link);
 }
 
 }  // namespace
@@ -126,7 +135,13 @@ DatasetInfo DatasetUpload::commit() {
     throw InvalidInput("frames", "the header announced " + std::to_string(frames_) + ", " +
                                      std::to_string(writer_->frameCount()) + " came");
   writer_->close();
-  return store_.publish(*this);
+  return store_.publish({.name = name_,
+                         .frames = frames_,
+                         .vertex_count = topology_->vertexCount(),
+                         .face_count = topology_->faces().rows(),
+                         .topology_id = topology_->id(),
+                         .created = {}},
+                        folder_);
 }
 
 DatasetStore::DatasetStore(fs::path root) : root_(std::move(root)) {
@@ -138,7 +153,8 @@ DatasetStore::DatasetStore(fs::path root) : root_(std::move(root)) {
       continue;
     }
     try {
-      datasets_.emplace(name, readInfo(entry.path()));
+      const auto info = readDatasetInfo(entry.path());
+      if (info.name == name) datasets_.emplace(name, info);
     } catch (const std::exception&) {
       // Not a dataset of ours: left alone, not served.
     }
@@ -154,19 +170,24 @@ std::unique_ptr<DatasetUpload> DatasetStore::begin(const std::string& name, std:
   return std::unique_ptr<DatasetUpload>(new DatasetUpload(*this, name, std::move(topology), frames, scratchFolder()));
 }
 
-DatasetInfo DatasetStore::publish(const DatasetUpload& upload) {
-  const auto& topology = *upload.topology_;
-  const DatasetInfo info{
-      upload.name_,           upload.frames_,
-      topology.vertexCount(), topology.faces().rows(),
-      topology.id(),          std::chrono::floor<std::chrono::seconds>(std::chrono::system_clock::now())};
-  writeInfo(upload.folder_, info);
+std::unique_ptr<ScanUpload> DatasetStore::beginScans(const std::string& name, std::int64_t scans) {
+  requireName(name, "name");
+  if (scans < 1) throw InvalidInput("scans", "= " + std::to_string(scans) + ", want >= 1");
+  return std::unique_ptr<ScanUpload>(new ScanUpload(*this, name, scans, scratchFolder()));
+}
+
+DatasetInfo DatasetStore::publish(DatasetInfo info, const fs::path& folder) {
+  info.created = std::chrono::floor<std::chrono::seconds>(std::chrono::system_clock::now());
+  writeDatasetInfo(folder, info);
   const std::scoped_lock lock(mutex_);
   if (const auto found = datasets_.find(info.name); found != datasets_.end()) {
-    if (sameContent(root_ / info.name, upload.folder_)) return found->second;
-    throw AlreadyExists("dataset \"" + info.name + "\" exists and holds other shapes; delete it or take another name");
+    if (found->second.kind == info.kind && found->second.frames == info.frames &&
+        sameContent(info, root_ / info.name, folder))
+      return found->second;
+    throw AlreadyExists("dataset \"" + info.name + "\" exists and holds other " +
+                        (info.kind == DatasetKind::kScans ? "scans" : "shapes") + "; delete it or take another name");
   }
-  fs::rename(upload.folder_, root_ / info.name);
+  fs::rename(folder, root_ / info.name);
   datasets_.emplace(info.name, info);
   return info;
 }
@@ -178,11 +199,23 @@ std::vector<DatasetInfo> DatasetStore::list() const {
   return result;
 }
 
-DatasetInfo DatasetStore::get(const std::string& name) const {
+DatasetInfo DatasetStore::find(const std::string& name) const {
   const std::scoped_lock lock(mutex_);
   const auto found = datasets_.find(name);
   if (found == datasets_.end()) throw NotFound("there is no dataset \"" + name + "\"");
   return found->second;
+}
+
+DatasetInfo DatasetStore::get(const std::string& name) const {
+  auto info = find(name);
+  if (info.kind != DatasetKind::kShapes) throw otherKind("dataset", info);
+  return info;
+}
+
+DatasetInfo DatasetStore::getScans(const std::string& name, const std::string& field) const {
+  auto info = find(name);
+  if (info.kind != DatasetKind::kScans) throw otherKind(field, info);
+  return info;
 }
 
 template <class Read>
@@ -190,25 +223,35 @@ auto DatasetStore::reading(const std::string& name, const Read& read) const {
   const auto info = get(name);
   const auto folder = root_ / name;
   try {
-    auto topology = std::make_shared<const Topology>(info.vertex_count, readFaces(folder));
-    if (topology->id() != info.topology_id) throw notAsUploaded(name);
-    return read(info, folder, std::move(topology));
+    return read(info, folder, readTopology(info, folder));
   } catch (const InvalidInput& error) {
     get(name);  // deleted while we read it: NotFound says so
-    throw Corrupted("dataset \"" + name + "\" cannot be read: " + error.what());
+    throw unreadable(name, error);
   }
 }
 
-Dataset DatasetStore::load(const std::string& name) const {
-  return reading(name, [&](const DatasetInfo& info, const fs::path& folder, TopologyPtr topology) -> Dataset {
-    auto shapes = readFrames(folder / kFrames);
-    if (std::ssize(shapes) != info.frames) throw notAsUploaded(name);
-    std::optional<Vertices> template_shape;
-    if (fs::exists(folder / kTemplate)) template_shape = readFrames(folder / kTemplate).front();
-    for (const auto& shape : shapes) requireValidShape(*topology, shape, name);
-    if (template_shape) requireValidShape(*topology, *template_shape, name);
-    return {std::move(topology), std::move(shapes), std::move(template_shape)};
-  });
+Dataset DatasetStore::load(const std::string& name) const { return reading(name, readShapes); }
+
+Dataset readDataset(const fs::path& folder) {
+  const auto info = readDatasetInfo(folder);
+  try {
+    return readShapes(info, folder, readTopology(info, folder));
+  } catch (const InvalidInput& error) {
+    throw unreadable(info.name, error);
+  }
+}
+
+void DatasetStore::keep(const std::string& name, const fs::path& folder) const {
+  if (fs::exists(folder)) return;
+  removeAbandoned(folder.parent_path());
+  ScratchFolder scratch(folder.parent_path());
+  {
+    const std::scoped_lock lock(mutex_);  // it must not go, and another come, half-way
+    if (!datasets_.contains(name)) throw NotFound("there is no dataset \"" + name + "\"");
+    for (const auto& file : fs::directory_iterator(root_ / name))
+      linkOrCopy(file.path(), scratch.path() / file.path().filename());
+  }
+  scratch.rename(folder);
 }
 
 DatasetFrames DatasetStore::open(const std::string& name) const {
@@ -229,7 +272,7 @@ Vertices DatasetFrames::frame(std::int64_t index) const {
     requireValidShape(*topology_, shape, framePath(index, ""));
     return shape;
   } catch (const InvalidInput& error) {
-    throw Corrupted("dataset \"" + name_ + "\" cannot be read: " + error.what());
+    throw unreadable(name_, error);
   }
 }
 

@@ -1,6 +1,5 @@
 #pragma once
 
-#include <chrono>
 #include <filesystem>
 #include <map>
 #include <memory>
@@ -11,18 +10,11 @@
 
 #include "core/io/frames.h"
 #include "core/mesh/topology.h"
+#include "server/datasets/dataset_info.h"
+#include "server/datasets/scan_files.h"
+#include "server/datasets/scan_upload.h"
 
 namespace shaped::server {
-
-/// What is known of a dataset without reading its frames.
-struct DatasetInfo {
-  std::string name;
-  std::int64_t frames = 0;
-  std::int32_t vertex_count = 0;
-  std::int64_t face_count = 0;
-  std::string topology_id;
-  std::chrono::system_clock::time_point created;
-};
 
 /// Shapes that share a connectivity.
 struct Dataset {
@@ -84,8 +76,12 @@ class DatasetUpload {
   std::optional<FrameWriter> writer_;
 };
 
-/// Datasets under <root>/<name>/: frames.npy (n x V x 3 floats), faces.npy (F x 3), dataset.json, and
-/// template.npy (1 x V x 3) where there is one. They appear and go by
+/// Reads a dataset of shapes out of a folder that DatasetStore::keep() made. Throws Corrupted when the files do not
+/// hold what was uploaded.
+Dataset readDataset(const std::filesystem::path& folder);
+
+/// Datasets under <root>/<name>/, each with a dataset.json. Of shapes: frames.npy (n x V x 3 floats), faces.npy (F x
+/// 3), and template.npy (1 x V x 3) where there is one. Of scans: a file a scan (scan_files.h). They appear and go by
 /// one rename each, so a crash leaves whole datasets and rubbish that the next start removes. Safe from any thread.
 class DatasetStore {
  public:
@@ -96,26 +92,37 @@ class DatasetStore {
   /// two-manifold (field "faces[i]").
   std::unique_ptr<DatasetUpload> begin(const std::string& name, std::int32_t vertex_count, Faces faces,
                                        std::int64_t frames);
-  /// By name.
+  /// scans >= 1 announced raw scans. Throws InvalidInput for a bad name or count.
+  std::unique_ptr<ScanUpload> beginScans(const std::string& name, std::int64_t scans);
+  /// Of both kinds, by name.
   std::vector<DatasetInfo> list() const;
-  /// Throws NotFound.
+  /// One of shapes. Throws NotFound; InvalidInput naming "dataset" when it holds scans, as do the functions below.
   DatasetInfo get(const std::string& name) const;
+  /// One of scans. Throws NotFound; InvalidInput naming `field` when it holds shapes.
+  DatasetInfo getScans(const std::string& name, const std::string& field) const;
   /// Reads a dataset. Throws NotFound; Corrupted when its files do not hold what was uploaded.
   Dataset load(const std::string& name) const;
   /// Opens a dataset for reading frame by frame. Throws as load().
   DatasetFrames open(const std::string& name) const;
   /// Its connectivity alone. Throws as load().
   TopologyPtr topology(const std::string& name) const;
+  /// Gives a folder that is to be the same files by hard links (copies where the disk has none): whoever works on a
+  /// dataset for days has it then whatever becomes of its name. The folder appears complete or not at all; one that is
+  /// there already is left as it is. Throws NotFound; FileError when the disk fails.
+  void keep(const std::string& name, const std::filesystem::path& folder) const;
   /// Throws NotFound; FileError when the disk fails.
   void remove(const std::string& name);
 
  private:
   friend class DatasetUpload;
+  friend class ScanUpload;
   std::filesystem::path scratchFolder();
+  DatasetInfo find(const std::string& name) const;
   /// What read(info, folder, topology) returns.
   template <class Read>
   auto reading(const std::string& name, const Read& read) const;
-  DatasetInfo publish(const DatasetUpload& upload);
+  /// Publishes what lies complete in a scratch folder.
+  DatasetInfo publish(DatasetInfo info, const std::filesystem::path& folder);
 
   const std::filesystem::path root_;
   mutable std::mutex mutex_;

@@ -276,23 +276,34 @@ std::stop_token JobRunner::enter(const std::string& id) {
 
 JobRun JobRunner::runOf(const JobRecord& job, std::stop_token stop) {
   const auto& id = job.id;
-  return {job,
-          folderOf(job),
-          [this, id](const Progress& progress) { registry_.report(id, progress); },
-          std::move(stop),
-          [this, id](const std::string& stage) {
-            registry_.update(id, [&](JobRecord& record) { record.resumed_from = stage; });
-          },
-          [this, id] {
-            if (registry_.get(id).crashes > 0) registry_.update(id, [](JobRecord& record) { record.crashes = 0; });
-          },
-          [this, id](const JobResult& result) {
-            registry_.update(id, [&](JobRecord& record) { record.result = result; });
-          }};
+  return {
+      job,
+      folderOf(job),
+      [this, id](const Progress& progress) { registry_.report(id, progress); },
+      std::move(stop),
+      [this, id](const std::string& stage) {
+        registry_.update(id, [&](JobRecord& record) { record.resumed_from = stage; });
+      },
+      [this, id] {
+        if (registry_.get(id).crashes > 0) registry_.update(id, [](JobRecord& record) { record.crashes = 0; });
+      },
+      [this, id](const JobResult& result) { registry_.update(id, [&](JobRecord& record) { record.result = result; }); },
+      [news = openNews(id)](std::string item) { news->add(std::move(item)); }};
 }
 
-/// Records how a run ended, however long that takes on a full disk, and returns the record; nothing when the runner left
-/// before: then the next start finds out what became of the job.
+std::shared_ptr<JobNews> JobRunner::openNews(const std::string& id) {
+  const std::scoped_lock lock(mutex_);
+  return news_[id] = std::make_shared<JobNews>();
+}
+
+std::shared_ptr<const JobNews> JobRunner::newsOf(const std::string& job) const {
+  const std::scoped_lock lock(mutex_);
+  const auto found = news_.find(job);
+  return found == news_.end() ? nullptr : found->second;
+}
+
+/// Records how a run ended, however long that takes on a full disk, and returns the record; nothing when the runner
+/// left before: then the next start finds out what became of the job.
 std::optional<JobRecord> JobRunner::end(const std::string& id, const std::function<void(JobRecord&)>& change) {
   std::optional<JobRecord> ended;
   for (bool told = false;;) {
@@ -330,6 +341,7 @@ void JobRunner::run(const JobRecord& job) {
   {
     const std::scoped_lock lock(mutex_);
     stops_.erase(job.id);
+    news_.erase(job.id);  // who watches still holds it
   }
   try {
     if (!ended || !hasEnded(ended->state)) return;

@@ -13,6 +13,7 @@
 
 #include "core/numerics/progress.h"
 #include "server/jobs/job_input.h"
+#include "server/jobs/job_news.h"
 #include "server/jobs/job_registry.h"
 
 namespace shaped::server {
@@ -34,6 +35,8 @@ struct JobRun {
   std::function<void(const std::string& stage)> resumed;  ///< it goes on from a checkpoint of this stage
   std::function<void()> checkpointed;                     ///< it has kept a checkpoint of this run
   std::function<void(const JobResult& so_far)> solved;    ///< the solver has ended; call before publishing
+  /// What those who watch the job are told with its next progress, bytes of that kind's own; from any thread.
+  std::function<void(std::string)> tell;
 };
 
 /// How jobs of one kind are done.
@@ -65,8 +68,8 @@ class JobRunner {
 
   /// For what a client sends for a job that is to be started with it. Throws FileError.
   std::unique_ptr<JobInput> newInput() const;
-  /// Creates a job of a known kind and queues it; see JobRegistry::create. input: becomes the job's unless an earlier one
-  /// is returned. Throws what that throws, and FileError.
+  /// Creates a job of a known kind and queues it; see JobRegistry::create. input: becomes the job's unless an earlier
+  /// one is returned. Throws what that throws, and FileError.
   JobRecord start(JobRecord wanted, JobInput* input = nullptr);
   /// Asks a job to stop: one that waits ends at once, one that runs soon. Throws NotFound.
   JobRecord cancel(const std::string& job);
@@ -75,6 +78,8 @@ class JobRunner {
   /// The file of records (record_file.h) that a job has left. Throws NotFound; WrongState when it has not succeeded, or
   /// is of a kind without a result.
   std::filesystem::path resultOf(const std::string& job) const;
+  /// What a job tells while it runs; null unless it runs here.
+  std::shared_ptr<const JobNews> newsOf(const std::string& job) const;
   /// Whether jobs of this kind publish models; of an unknown kind yes, as nobody knows.
   bool publishes(const std::string& kind) const;
   /// Claims no more jobs and asks the running ones to keep a checkpoint and stop; they are queued again, for the next
@@ -88,6 +93,7 @@ class JobRunner {
   std::optional<JobRecord> claimSoon();
   void run(const JobRecord& job);
   JobRun runOf(const JobRecord& job, std::stop_token stop);
+  std::shared_ptr<JobNews> openNews(const std::string& id);
   std::optional<JobRecord> end(const std::string& id, const std::function<void(JobRecord&)>& change);
   std::stop_token enter(const std::string& id);
   bool pause(std::chrono::milliseconds time, std::uint64_t seen);
@@ -102,11 +108,12 @@ class JobRunner {
   const JobLimits limits_;
   const std::filesystem::path folder_;
   const Ended on_ended_;
-  std::mutex mutex_;
+  mutable std::mutex mutex_;
   std::condition_variable wake_;
   std::uint64_t wakes_ = 0;
   bool leaving_ = false;
-  std::map<std::string, std::stop_source> stops_;  // of jobs that run
+  std::map<std::string, std::stop_source> stops_;         // of jobs that run
+  std::map<std::string, std::shared_ptr<JobNews>> news_;  // of these, too
   std::vector<std::thread> threads_;
 };
 

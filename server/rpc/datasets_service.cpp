@@ -3,12 +3,14 @@
 #include "core/numerics/error.h"
 #include "server/convert/dataset.h"
 #include "server/convert/mesh.h"
+#include "server/convert/scan.h"
 #include "server/rpc/incoming_stream_call.h"
 #include "server/rpc/unary_call.h"
 
 namespace shaped::server {
 namespace {
 
+/// Takes the frames or the scans of one dataset in.
 class UploadHandler final : public StreamHandler<v1::UploadDatasetRequest, v1::UploadDatasetResponse> {
  public:
   UploadHandler(DatasetStore& store, const Limits& limits) : store_(store), limits_(limits) {}
@@ -18,44 +20,71 @@ class UploadHandler final : public StreamHandler<v1::UploadDatasetRequest, v1::U
       begin(request.header());
     else if (request.has_frame())
       append(request.frame());
+    else if (request.has_scan())
+      append(request.scan());
     else
-      throw InvalidInput("part", "is neither header nor frame");
+      throw InvalidInput("part", "is neither header nor frame nor scan");
     return false;
   }
 
   void end(v1::UploadDatasetResponse& response, Call&) override {
-    if (!upload_) throw InvalidInput("header", "is missing: the stream was empty");
-    toProto(upload_->commit(), *response.mutable_dataset());
-    upload_.reset();
+    if (!begun()) throw InvalidInput("header", "is missing: the stream was empty");
+    toProto(shapes_ ? shapes_->commit() : scans_->commit(), *response.mutable_dataset());
+    shapes_.reset();
+    scans_.reset();
   }
 
  private:
+  bool begun() const { return shapes_ || scans_; }
+
   void begin(const v1::UploadDatasetRequest::Header& header) {
-    if (upload_) throw InvalidInput("header", "came a second time");
+    if (begun()) throw InvalidInput("header", "came a second time");
+    if (kindFromProto(header.kind(), "header.kind") == DatasetKind::kScans)
+      beginScans(header);
+    else
+      beginShapes(header);
+  }
+
+  void beginShapes(const v1::UploadDatasetRequest::Header& header) {
     auto faces = facesFromProto(header.faces(), header.vertex_count(), limits_, "header.faces");
     requireAtMost(header.frames(), limits_.frames, "header.frames", "frames");
-    upload_ = store_.begin(header.name(), static_cast<std::int32_t>(header.vertex_count()), std::move(faces),
+    shapes_ = store_.begin(header.name(), static_cast<std::int32_t>(header.vertex_count()), std::move(faces),
                            header.frames());
     if (header.template_positions().empty()) return;
     const auto field = "header.template_positions";
-    upload_->setTemplate(pointsFromProto(header.template_positions(), upload_->topology().vertexCount(), field));
+    shapes_->setTemplate(pointsFromProto(header.template_positions(), shapes_->topology().vertexCount(), field));
+  }
+
+  void beginScans(const v1::UploadDatasetRequest::Header& header) {
+    if (header.vertex_count() != 0 || !header.faces().empty() || !header.template_positions().empty())
+      throw InvalidInput("header", "has vertices, faces or a template, which go with shapes and not with raw scans");
+    requireAtMost(header.frames(), limits_.frames, "header.frames", "scans");
+    scans_ = store_.beginScans(header.name(), header.frames());
   }
 
   void append(const v1::UploadDatasetRequest::Frame& frame) {
-    if (!upload_) throw InvalidInput("header", "is missing: the first message must be it");
+    if (!begun()) throw InvalidInput("header", "is missing: the first message must be it");
+    if (!shapes_) throw InvalidInput("part", "is a frame, and the header announced raw scans");
     const auto label = frame.label().empty() ? "" : " (" + frame.label() + ")";
     const auto field = "frames[" + std::to_string(frame_count_++) + "]" + label;
-    const std::int64_t vertex_count = upload_->topology().vertexCount();
+    const std::int64_t vertex_count = shapes_->topology().vertexCount();
     if (frame.positions_size() != 3 * vertex_count)
       throw InvalidInput(field, "has " + std::to_string(frame.positions_size()) + " coordinates, want " +
                                     std::to_string(3 * vertex_count) + " for " + std::to_string(vertex_count) +
                                     " vertices");
-    upload_->append(pointsFromProto(frame.positions(), vertex_count, field), frame.label());
+    shapes_->append(pointsFromProto(frame.positions(), vertex_count, field), frame.label());
+  }
+
+  void append(const v1::UploadDatasetRequest::RawScan& scan) {
+    if (!begun()) throw InvalidInput("header", "is missing: the first message must be it");
+    if (!scans_) throw InvalidInput("part", "is a raw scan, and the header announced shapes");
+    scans_->append(scanFromProto(scan.scan(), limits_, scans_->nextField(scan.name())), scan.name());
   }
 
   DatasetStore& store_;
   const Limits& limits_;
-  std::unique_ptr<DatasetUpload> upload_;
+  std::unique_ptr<DatasetUpload> shapes_;
+  std::unique_ptr<ScanUpload> scans_;
   std::int64_t frame_count_ = 0;
 };
 

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <chrono>
+#include <filesystem>
 #include <optional>
 #include <string>
 
@@ -21,6 +22,7 @@ struct JobContext {
   const Limits& limits;
   std::chrono::duration<double> publish_patience;  ///< how long what is done waits for room on a full disk
   std::chrono::duration<double> checkpoint_every;  ///< time between two checkpoints
+  std::filesystem::path trainer;                   ///< the program shaped-trainer, which need not be there
 };
 
 /// Where requests start jobs.
@@ -30,8 +32,8 @@ struct JobDesk {
   JobRunner& runner;
 };
 
-/// A full disk must not cost hours of work: writes, and tries again until there is room, the context's patience ends (then
-/// throws what `write` threw) or the job is stopped (then throws Stopped).
+/// A full disk must not cost hours of work: writes, and tries again until there is room, the context's patience ends
+/// (then throws what `write` threw) or the job is stopped (then throws Stopped).
 void patiently(const JobContext& context, const JobRun& run, const std::function<void()>& write);
 
 /// The model of a job; waits while it is being loaded. Throws as ModelStore::pin, and Stopped.
@@ -40,8 +42,8 @@ ServedModelPtr pinForJob(const JobContext& context, const JobRun& run, const v1:
 /// Names the version that is served, so that a job has the same model whenever it runs.
 void nameVersion(const ServedModel& served, v1::ModelSelector& model);
 
-/// Lets a request that is repeated name the version that its job was given, so that the two are the same request. known:
-/// what that job was asked.
+/// Lets a request that is repeated name the version that its job was given, so that the two are the same request.
+/// known: what that job was asked.
 void repeatVersion(const v1::ModelSelector& known, v1::ModelSelector& model);
 
 /// "NAME@VERSION".

@@ -115,7 +115,8 @@ grpc::ServerUnaryReactor* JobsService::List(grpc::CallbackServerContext* context
 
 grpc::ServerWriteReactor<v1::WatchJobResponse>* JobsService::Watch(grpc::CallbackServerContext* context,
                                                                    const v1::WatchJobRequest* request) {
-  const auto call = std::make_shared<WatchCall>(runtime_, registry_, *context, request->id(), stop_.get_token());
+  const auto call =
+      std::make_shared<WatchCall>(runtime_, registry_, runner_, *context, request->id(), stop_.get_token());
   call->enter(*request);
   return call.get();
 }

@@ -25,12 +25,20 @@ void fill(const ServedModel& served, const BodyShapes& body, const Solved<ScanRe
   if (with_shape) toProto(found.vertices, body.topology(), *response.mutable_shape());
   toProto(coefficientsOf(found.state, body.modes()), *response.mutable_coefficients());
   toProto(found.report, *response.mutable_scan_report());
+  if (found.field) toProto(found.field->report, *response.mutable_field_report());
   response.set_took_runner_up(found.took_runner_up);
   response.set_flipped_normals(found.flipped_normals);
   response.set_suspected_unit_factor(found.suspected_unit_factor.value_or(0));
   response.set_score(found.score);
   response.mutable_warnings()->Add(found.warnings.begin(), found.warnings.end());
   if (found.refinement) toProto(*found.refinement, *response.mutable_refinement());
+}
+
+/// As the request wants it of this model: with its field, if it has one, unless that is to be left aside.
+ScanRegistrationOptions optionsFor(const BodyShapes& body, const v1::RegistrationOptions& message, const Call& call) {
+  auto options = registrationOptionsFromProto(message, call.stopToken());
+  if (!message.without_field()) options.field = body.field(call.stopToken());
+  return options;
 }
 
 /// Registers from nothing; says how sure the placement is where the scan alone told it.
@@ -66,8 +74,7 @@ class ScanStream final : public StreamHandler<v1::RegisterSequenceRequest, v1::R
   void begin(const v1::RegisterSequenceRequest::Setup& setup, Call& call) {
     if (served_) throw InvalidInput("setup", "came a second time");
     auto served = pinModel(store_, setup, call);
-    bodyFor("Registration.RegisterSequence", *served);
-    options_ = registrationOptionsFromProto(setup.options(), call.stopToken());
+    options_ = optionsFor(bodyFor("Registration.RegisterSequence", *served), setup.options(), call);
     with_shapes_ = !setup.options().without_shapes();
     served_ = std::move(served);
   }
@@ -102,7 +109,7 @@ void registerOne(ModelStore& store, const Limits& limits, const v1::RegisterRequ
                  v1::RegisterResponse& response, Call& call) {
   const auto served = pinModel(store, request, call);
   const auto& body = bodyFor("Registration.Register", *served);
-  const auto options = registrationOptionsFromProto(request.options(), call.stopToken());
+  const auto options = optionsFor(body, request.options(), call);
   const auto scan = scanFromProto(request.scan(), limits);
   const auto landmarks = landmarksFromProto(request.landmarks(), body.topology(), options.unit_factor, limits);
   registerAnew(*served, body, scan, landmarks, options, !request.options().without_shapes(), call, response, nullptr);

@@ -8,7 +8,8 @@
 #include "server/datasets/name.h"
 #include "server/errors/errors.h"
 #include "server/rpc/body_training.h"
-#include "server/telemetry/call_log.h"
+#include "server/rpc/bootstrap_job.h"
+#include "server/rpc/job_checkpoint.h"
 
 namespace shaped::server {
 namespace {
@@ -39,51 +40,15 @@ ShellPgaTrainingOptions optionsFrom(const v1::ShellPgaTraining& message, const D
   return options;
 }
 
-/// The checkpoint of one training job: found where an earlier process left it, written as time goes by.
-class TrainingCheckpoint {
- public:
-  TrainingCheckpoint(const JobRun& run, std::chrono::duration<double> every)
-      : run_(run), path_(run.folder / "checkpoint.safetensors"), every_(every) {}
-
-  /// What is there and of this training; a damaged or foreign one is told in the log and left aside.
-  std::optional<ShellPgaCheckpoint> find(const std::string& training) const {
-    if (!std::filesystem::exists(path_)) return std::nullopt;
-    try {
-      auto checkpoint = readCheckpoint(path_);
-      if (checkpoint.training == training) return checkpoint;
-      logError("job " + run_.job.id + " begins anew: " + path_.string() + " is of another training");
-    } catch (const std::exception& problem) {
-      logError("job " + run_.job.id + " begins anew: " + problem.what());
-    }
-    return std::nullopt;
-  }
-
-  /// Keeps the state when the last one is old, or the job is to stop. A disk that takes none does not end the training.
-  void offer(const std::function<ShellPgaCheckpoint()>& state) {
-    if (Clock::now() - kept_ < every_ && !run_.stop.stop_requested()) return;
-    kept_ = Clock::now();
-    try {
-      writeCheckpoint(path_, state());
-      run_.checkpointed();
-    } catch (const std::exception& problem) {
-      logError("job " + run_.job.id + " goes on without a checkpoint: " + problem.what());
-    }
-  }
-
- private:
-  const JobRun& run_;
-  const std::filesystem::path path_;
-  const std::chrono::duration<double> every_;
-  Clock::time_point kept_ = Clock::now();
-};
-
 Solved<ShellPgaModelPtr> trainResumed(const JobRun& run, const ShellPgaTrainingSet& set,
                                       const ShellPgaTrainingOptions& options, std::chrono::duration<double> every) {
-  TrainingCheckpoint checkpoint(run, every);
-  const auto found = checkpoint.find(trainingFingerprint(set, options));
+  JobCheckpoint checkpoint(run, every);
+  const auto found = checkpoint.find(trainingFingerprint(set, options), readCheckpoint);
   run.resumed(found ? found->stage() : "");
-  return trainShellPga(set, options, run.progress, run.stop,
-                       {[&](const auto& state) { checkpoint.offer(state); }, found ? &*found : nullptr});
+  return trainShellPga(
+      set, options, run.progress, run.stop,
+      {[&](const auto& state) { checkpoint.offer([&](const auto& path) { writeCheckpoint(path, state()); }); },
+       found ? &*found : nullptr});
 }
 
 std::string unconvergedText(const Outcome& outcome) {
@@ -125,15 +90,24 @@ const char* kindOf(const v1::TrainRequest& request) {
       return kTrainShellPga;
     case v1::TrainRequest::kBody:
       return kTrainBody;
+    case v1::TrainRequest::kBootstrap:
+      return kBootstrap;
     case v1::TrainRequest::METHOD_NOT_SET:
       break;
   }
-  throw InvalidInput("method", "is missing; want shell_pga or body");
+  throw InvalidInput("method", "is missing; want shell_pga, body or bootstrap");
 }
 
-void requireTrainable(const v1::TrainRequest& request, const DatasetInfo& dataset) {
-  request.has_body() ? server::requireTrainable(request.body(), dataset)
-                     : static_cast<void>(optionsFrom(request.shell_pga(), dataset));
+/// Checks a request and makes plain what it leaves to the daemon. A repeated one has its answer even if its dataset has
+/// been deleted since.
+void prepare(const JobContext& context, const std::optional<JobRecord>& known, v1::TrainRequest& request) {
+  if (request.has_bootstrap()) return known ? repeatBootstrap(*known, request) : prepareBootstrap(context, request);
+  if (known) return;
+  const auto dataset = context.datasets.get(request.dataset());
+  if (request.has_body())
+    requireTrainable(request.body(), dataset);
+  else
+    optionsFrom(request.shell_pga(), dataset);
 }
 
 }  // namespace
@@ -143,12 +117,11 @@ JobKind shellPgaTraining(const JobContext& context) {
           [&context](const JobRecord& job) { return context.models.publishedBy(job.model_name, job.key); }};
 }
 
-JobRecord startTraining(const JobDesk& desk, const v1::TrainRequest& request) {
+JobRecord startTraining(const JobDesk& desk, v1::TrainRequest request) {
   const auto known = earlierJob(desk, request.request_id());
   requireName(request.model_name(), "model_name");
   const auto* kind = kindOf(request);
-  // A repeated request has its answer even if its dataset has been deleted since.
-  if (!known) requireTrainable(request, desk.context.datasets.get(request.dataset()));
+  prepare(desk.context, known, request);
   auto wanted = newJob(kind, request.SerializeAsString(), request.request_id());
   wanted.model_name = request.model_name();
   wanted.dataset = request.dataset();

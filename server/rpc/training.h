@@ -10,7 +10,7 @@ inline constexpr const char* kTrainShellPga = "train_shell_pga";
 JobKind shellPgaTraining(const JobContext& context);
 
 /// Checks a request of any method and starts its job. Throws InvalidInput naming the field, NotFound for the dataset,
-/// Busy, AlreadyExists for a request_id of another request.
-JobRecord startTraining(const JobDesk& desk, const v1::TrainRequest& request);
+/// Busy, AlreadyExists for a request_id of another request; for a bootstrap what prepareBootstrap does.
+JobRecord startTraining(const JobDesk& desk, v1::TrainRequest request);
 
 }  // namespace shaped::server

@@ -4,10 +4,16 @@
 #include "server/rpc/wait_call.h"
 
 namespace shaped::server {
+namespace {
 
-WatchCall::WatchCall(Runtime& runtime, JobRegistry& registry, grpc::CallbackServerContext& context, std::string job,
-                     std::stop_token stop)
+constexpr std::size_t kNewsAtOnce = 1000;  ///< a message stays small
+
+}  // namespace
+
+WatchCall::WatchCall(Runtime& runtime, JobRegistry& registry, const JobRunner& runner,
+                     grpc::CallbackServerContext& context, std::string job, std::stop_token stop)
     : registry_(registry),
+      runner_(runner),
       call_(runtime, context, "Jobs.Watch", runtime.longest_call),
       job_(std::move(job)),
       stop_(std::move(stop)) {}
@@ -42,14 +48,26 @@ void WatchCall::writeNext() {
   if (last_) return;
   changed_ = false;
   const auto status = call_.guarded([this] {
-    const auto record = registry_.get(job_);
-    last_ = hasEnded(record.state);
     message_.Clear();
+    const auto record = registry_.get(job_);
+    const bool more = addNews();
+    if (more) changed_ = true;
+    last_ = hasEnded(record.state) && !more;
     toProto(record, *message_.mutable_job());
   });
   if (!status.ok()) return end(status);
   writing_ = true;
   StartWrite(&message_);
+}
+
+/// Whether there may be more.
+bool WatchCall::addNews() {
+  if (!news_) news_ = runner_.newsOf(job_);
+  if (!news_) return false;
+  const auto items = news_->from(told_, kNewsAtOnce);
+  for (const auto& item : items) message_.MergeFromString(item);
+  told_ += items.size();
+  return items.size() == kNewsAtOnce;
 }
 
 void WatchCall::OnWriteDone(bool ok) {

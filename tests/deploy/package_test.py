@@ -62,6 +62,16 @@ class Package(unittest.TestCase):
             self.assertRegex(listing, re.escape(path) + "\n")
         self.assertTrue(all(" root/root " in line for line in listing.splitlines()), listing)
 
+    def test_1_the_trainer_is_a_package_of_its_own(self):
+        self.assertNotIn("libtorch", field(self.deb, "Depends"))
+        self.assertNotIn("shaped-trainer", run("dpkg-deb", "-c", self.deb).stdout)
+        made = list(self.deb.parent.glob("shaped-trainer_*.deb"))
+        if not (self.deb.parents[1] / "bin/shaped-trainer").exists():
+            self.assertEqual(made, [])
+            return
+        self.assertIn("libtorch1", field(made[0], "Depends"))
+        self.assertRegex(run("dpkg-deb", "-c", made[0]).stdout, r"\./usr/bin/shaped-trainer\n")
+
     def test_2_it_installs_and_runs(self):
         self.install()
         self.assertEqual(self.inside("stat", "-c", "%U:%G:%a", "/var/lib/shaped").stdout, "shaped:shaped:750\n")

@@ -78,12 +78,12 @@ def base_system():
 def package():
     """The Debian package of the programs as they are built; made where it is older than what goes into it."""
     with alone("package"):
-        made = list((BUILD / "package").glob("*.deb"))
+        made = list((BUILD / "package").glob("shaped_*.deb"))
         if len(made) != 1 or made[0].stat().st_mtime < latest_change():
-            for old in made:
+            for old in (BUILD / "package").glob("*.deb"):
                 old.unlink()
             run("cpack", "--config", BUILD / "CPackConfig.cmake", cwd=BUILD)
-            made = list((BUILD / "package").glob("*.deb"))
+            made = list((BUILD / "package").glob("shaped_*.deb"))
     (deb,) = made
     return deb
 

@@ -33,7 +33,10 @@ void printText(const v1::ModelDescription::Body& body) {
             << "  posture      " << nameOf(body.posture()) << "\n"
             << "  joints       " << body.joints_size() << (body.limits() ? ", with limits:" : ", without limits:");
   for (const auto& joint : body.joints()) std::cout << " " << joint.name();
-  std::cout << "\n";
+  std::cout << "\n  field        " << (body.field() ? "yes, registrations are deformed by it" : "no") << "\n";
+  if (body.joined_size() > 0) std::cout << "  grown by    ";
+  for (const auto joined : body.joined()) std::cout << " " << joined;
+  if (body.joined_size() > 0) std::cout << " scans, round by round\n";
   printVariances("variances   ", body.variances(), body.modes());
 }
 

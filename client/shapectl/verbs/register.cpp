@@ -22,7 +22,7 @@ namespace {
 struct Register {
   std::string name, out, landmarks_file, report_file, unit = "m";
   std::vector<std::string> scans;
-  bool refine = false;
+  bool refine = false, without_field = false;
 
   void declare(Arguments& arguments) {
     arguments.positional("NAME", name, "The model, NAME or NAME@VERSION, of kind body");
@@ -31,6 +31,7 @@ struct Register {
     arguments.option("--report", report_file, "R.json", "Write coefficients, distances and warnings of every scan");
     arguments.option("--unit", unit, "U", "Of the scan and the landmarks: m, cm, mm, in, ... (m)");
     arguments.flag("--refine", refine, "Deform the surface onto the scan, beyond what the model can say");
+    arguments.flag("--without-field", without_field, "Leave the model's neural field aside, if it has one");
     arguments.positionals("SCAN", scans, 1,
                           "A scan (PLY, OBJ, OFF, STL, .npy, .xyz); several: a motion, each from where the last ended");
   }
@@ -49,6 +50,7 @@ struct Register {
     if (!metres) throw InvalidInput("--unit", "\"" + unit + "\" is no unit of length; want m, cm, mm, in, ...");
     options.set_unit_factor(*metres);
     options.set_refine(refine);
+    options.set_without_field(without_field);
     options.set_without_shapes(out.empty());
     return options;
   }

@@ -14,11 +14,12 @@ struct Result {
   ResultFiles files;
 
   void declare(Arguments& arguments) {
-    arguments.positional("JOB", id, "A job of evaluate, project or fit, as `shapectl jobs` lists it");
+    arguments.positional("JOB", id, "A job of evaluate, project, fit or bootstrap, as `shapectl jobs` lists it");
     arguments.option("-o,--out", files.out, "OUT.npy", "Write the shapes, n x V x 3 [m]");
     arguments.option("--report", files.report, "R.json", "Write how each answer came out");
     arguments.option("--plot", files.plot, "P.svg", "Of an evaluation: draw the measures over the number of modes");
-    arguments.option("--marker-set", set_file, "M.json", "Of a fit: the set it was started with, for the markers' names");
+    arguments.option("--marker-set", set_file, "M.json",
+                     "Of a fit: the set it was started with, for the markers' names");
   }
 
   ExitCode run(const Session& session) const {
@@ -45,6 +46,8 @@ struct Result {
 
 }  // namespace
 
-Verb resultVerb() { return makeVerb<Result>("result", "Fetch what a job of evaluate, project or fit has left"); }
+Verb resultVerb() {
+  return makeVerb<Result>("result", "Fetch what a job of evaluate, project, fit or bootstrap has left");
+}
 
 }  // namespace shaped::shapectl

@@ -7,6 +7,9 @@
 namespace shaped::shapectl {
 
 Verb trainVerb();
+Verb bootstrapVerb();
+Verb datasetsVerb();
+Verb deleteDatasetVerb();
 Verb modelsVerb();
 Verb loadVerb();
 Verb unloadVerb();

@@ -15,7 +15,8 @@ struct Watch {
     v1::Job last;
     {
       ProgressBar bar;
-      last = client::watchJob(*stub, id, session.callOptions(), [&](const v1::Job& job) { show(bar, job); });
+      last = client::watchJob(*stub, id, session.callOptions(),
+                              [&](const v1::WatchJobResponse& state) { show(bar, state.job()); });
     }
     return printEnded(last, session);
   }

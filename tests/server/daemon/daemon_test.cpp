@@ -115,6 +115,47 @@ TEST_CASE("a dataset travels to the daemon and back out of it") {
   CHECK(stub->Delete(&second, request, &response).error_code() == grpc::NOT_FOUND);
 }
 
+TEST_CASE("raw scans travel to the daemon, and faulty ones are refused by name") {
+  const test::TestDaemon daemon;
+  const auto dense = test::icosphere(2);
+  const auto scanHeader = [](std::uint32_t scans) {
+    v1::UploadDatasetRequest message;
+    message.mutable_header()->set_name("people");
+    message.mutable_header()->set_kind(v1::DATASET_KIND_SCANS);
+    message.mutable_header()->set_frames(scans);
+    return message;
+  };
+  const auto scan = [](const Vertices& points, const std::string& name) {
+    v1::UploadDatasetRequest message;
+    server::toProto(points, *message.mutable_scan()->mutable_scan()->mutable_positions());
+    message.mutable_scan()->set_name(name);
+    return message;
+  };
+  const auto refused = [&](const std::vector<v1::UploadDatasetRequest>& messages, const std::string& text) {
+    const auto status = upload(daemon, messages);
+    CHECK(status.error_code() == grpc::INVALID_ARGUMENT);
+    CHECK_THAT(status.error_message(), Contains(text));
+  };
+  refused({scanHeader(1), scan(sphere.vertices, "small.ply")},
+          "scans[0] (small.ply): has 42 points, want at least 100");
+  refused({scanHeader(1), scan(Vertices(0, 3), "")}, "scans[0]: has no points");
+  auto broken = dense.vertices;
+  broken(7, 1) = std::nan("");
+  refused({scanHeader(1), scan(broken, "nan.ply")}, "scans[0] (nan.ply).points[7]: has a coordinate");
+  refused({scanHeader(2), scan(dense.vertices, "")}, "scans: the header announced 2, 1 came");
+  refused({scanHeader(1), frame(sphere.vertices)}, "part: is a frame, and the header announced raw scans");
+  refused({header("spheres", 1), scan(dense.vertices, "")}, "part: is a raw scan, and the header announced shapes");
+  auto mixed = header("people", 1);
+  mixed.mutable_header()->set_kind(v1::DATASET_KIND_SCANS);
+  refused({mixed}, "header: has vertices, faces or a template");
+  CHECK(datasets(daemon).datasets_size() == 0);
+  REQUIRE(upload(daemon, {scanHeader(1), scan(dense.vertices, "one.ply")}).ok());
+  REQUIRE(datasets(daemon).datasets_size() == 1);
+  CHECK(datasets(daemon).datasets(0).kind() == v1::DATASET_KIND_SCANS);
+  CHECK(datasets(daemon).datasets(0).frames() == 1);
+  CHECK(datasets(daemon).datasets(0).vertex_count() == 0);
+}
+
 TEST_CASE("faulty uploads are refused by frame and leave nothing") {
   const test::TestDaemon daemon;
   const auto refused = [&](const std::vector<v1::UploadDatasetRequest>& messages, const std::string& text) {
