@@ -3,10 +3,12 @@
 #include <oneapi/tbb/parallel_for.h>
 
 #include <algorithm>
+#include <cmath>
 #include <mutex>
 
 #include "core/bootstrap/acceptance.h"
 #include "core/bootstrap/field_examples.h"
+#include "core/bootstrap/field_judgement.h"
 #include "core/bootstrap/round_scans.h"
 #include "core/numerics/error.h"
 #include "core/registration/scan_checks.h"
@@ -111,17 +113,33 @@ class Bootstrap {
       throw InvalidInput("examples",
                          "none can be fitted by the model, so that there is nothing to train a field on; "
                          "do the scans show what the registrations do?");
+    const auto judges = takeJudges(set.pairs);
     set.scaling = scalingOf(*set.reference);
     tell("training the field on " + std::to_string(set.pairs.size()) + " scans", kFieldBegins);
     auto field = train_(set, watch_.stop);
     if (!field) return false;
     const JacobianField complete(*field);  // says what does not fit
+    if (!judges.empty()) field = judged(set, std::move(*field), judges);
     field->regression = std::move(regression.weights);
     note([&] {
       state_.field = std::move(field);
       ++state_.trainings;
     });
     return true;
+  }
+
+  /// The field, silenced where it does not help bodies that it has not seen.
+  JacobianFieldWeights judged(const FieldTrainingSet& set, JacobianFieldWeights field,
+                              const std::vector<RestPair>& judges) const {
+    const auto judgement = judgeField(set, field, judges);
+    const auto millimetres = [](double metres) {
+      return std::to_string(std::lround(1e5 * metres) / 100.0).substr(0, 5);
+    };
+    tell(std::string(judgement.helps() ? "the field helps" : "the field does not help and is silenced") + ": of " +
+             std::to_string(judges.size()) + " scans held out it leaves " + millimetres(judgement.after) +
+             " mm where there were " + millimetres(judgement.before) + " mm",
+         kScansBegin);
+    return judgement.helps() ? std::move(field) : silenced(std::move(field));
   }
 
   bool fitExamples(const BodyModel& model) {

@@ -70,6 +70,9 @@ struct Bootstrapped {
 /// at rest (posture normalised, rigidly aligned to X_o), and X' joins at rest, as in the paper: limbs of a small
 /// model's fit turn to make up for what its identities lack, and the target at rest does not.
 ///
+/// From ten registrations in R_DEFORM on, every fifth judges the field, which is trained on the others: one that brings
+/// these no nearer is silenced, and its round goes by the regression alone (progress says so).
+///
 /// resumed: a checkpoint of the same inputs and options, whose fingerprint the caller has compared; each_scan and
 /// each_round do not tell again what it holds. The result has the same bits with or without interruptions, whatever the
 /// number of threads; scans are parallelised over the caller's oneTBB arena. Nothing when the stop token fired.
