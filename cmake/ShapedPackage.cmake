@@ -36,19 +36,18 @@ file(CONFIGURE OUTPUT ShapedPackageParts.cmake @ONLY CONTENT
      "if(EXISTS \"@CMAKE_RUNTIME_OUTPUT_DIRECTORY@/shaped-trainer\")\n  set(CPACK_COMPONENTS_ALL shaped trainer)\nendif()\n")
 set(CPACK_DEBIAN_SHAPED_PACKAGE_NAME shaped)
 set(CPACK_DEBIAN_TRAINER_PACKAGE_NAME shaped-trainer)
-set(CPACK_COMPONENT_SHAPED_DESCRIPTION
+set(CPACK_DEBIAN_SHAPED_DESCRIPTION
     "daemon for trained shape models over gRPC, and its client\nshaped keeps trained shape, pose and motion models in memory and answers\ngeometry requests over gRPC; shapectl is its client at the terminal.")
-set(CPACK_COMPONENT_TRAINER_DESCRIPTION
+set(CPACK_DEBIAN_TRAINER_DESCRIPTION
     "trains the neural fields of shaped's body models\nshaped starts it where a body model grows by raw scans. It brings LibTorch.")
 set(CPACK_PACKAGE_DESCRIPTION_SUMMARY "daemon for trained shape models over gRPC, and its client")
-set(CPACK_PACKAGE_DESCRIPTION
-    "shaped keeps trained shape, pose and motion models in memory and answers\ngeometry requests over gRPC; shapectl is its client at the terminal.")
 set(CPACK_INSTALL_PREFIX /usr)
 set(CPACK_SET_DESTDIR ON)  # /etc is outside the prefix
 set(CPACK_STRIP_FILES ON)
 set(CPACK_DEBIAN_FILE_NAME DEB-DEFAULT)
 set(CPACK_DEBIAN_PACKAGE_SECTION science)
 set(CPACK_DEBIAN_SHAPED_PACKAGE_DEPENDS adduser)
+set(CPACK_DEBIAN_SHAPED_PACKAGE_SUGGESTS shaped-trainer)
 set(CPACK_DEBIAN_PACKAGE_SHLIBDEPS ON)
 set(CPACK_DEBIAN_PACKAGE_CONTROL_STRICT_PERMISSION ON)
 set(CPACK_DEBIAN_SHAPED_PACKAGE_CONTROL_EXTRA

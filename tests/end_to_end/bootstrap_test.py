@@ -13,11 +13,16 @@ import unittest
 
 import numpy
 
-from support import BAD_INPUT, BINARIES, CANCELLED, NOT_FOUND, SUCCESS, Daemon, DaemonCase, skip_loudly
+from support import BAD_INPUT, BINARIES, CANCELLED, NOT_CONVERGED, NOT_FOUND, SUCCESS, Daemon, DaemonCase, skip_loudly, write_tubes
 
 TRAINER = BINARIES / "shaped-trainer"
-TINY = ("--modes", 3, "--epochs", 2, "--least-joined", 1, "--posture", "none")
 REGISTERED, SCANNED = 7, 3
+
+
+def tiny(*words):
+    """Options under which a bootstrap takes seconds, but for those that are given."""
+    small = {"--modes": 3, "--epochs": 2, "--least-joined": 1, "--posture": "none"}
+    return [word for option, value in small.items() if option not in words for word in (option, value)] + list(words)
 
 
 def trainers_of(daemon):
@@ -73,10 +78,13 @@ class Bootstrap(DaemonCase):
     def setUpClass(cls):
         Creatures.make()
         super().setUpClass()
+        tubes = cls.shapectl("train", "shell-pga", "tubes", *write_tubes(cls.folder), "--modes", 2, "--coarse-vertices", 60)
+        if tubes.code != SUCCESS:
+            raise RuntimeError(tubes.err)
 
     def bootstrap(self, *words, scans=None, shapes=None):
         shapes = Creatures.shapes() if shapes is None else shapes
-        return ("bootstrap", "grown", "--scans", scans or Creatures.folder / "scans", *shapes, *TINY, *words)
+        return ("bootstrap", "grown", "--scans", scans or Creatures.folder / "scans", *shapes, *tiny(*words))
 
     def folder_of(self, name, files):
         folder = self.folder / name
@@ -120,7 +128,7 @@ class Bootstrap(DaemonCase):
     def test_datasets_are_listed_and_deleted(self):
         self.refused("rounds = 0", *self.bootstrap("--rounds", 0))  # what was uploaded stays
         listed = {d["kind"]: d for d in self.expect(SUCCESS, "datasets").json["datasets"]}
-        self.assertEqual((listed["scans"]["frames"], listed["shapes"]["frames"]), (SCANNED, REGISTERED))
+        self.assertEqual(listed["scans"]["frames"], SCANNED)
         self.expect(SUCCESS, "delete-dataset", listed["scans"]["name"])
         self.expect(NOT_FOUND, "delete-dataset", listed["scans"]["name"])
 
@@ -130,9 +138,9 @@ class WithoutTrainer(DaemonCase):
 
     def test_a_missing_trainer_is_said_when_the_job_is_submitted(self):
         Creatures.make()
-        result = self.shapectl("bootstrap", "grown", "--scans", Creatures.folder / "scans", *Creatures.shapes(), *TINY)
+        result = self.shapectl("bootstrap", "grown", "--scans", Creatures.folder / "scans", *Creatures.shapes(), *tiny())
         self.assertEqual(result.code, BAD_INPUT, result.err)
-        self.assertEqual(result.json["error"]["code"], "FAILED_PRECONDITION")
+        self.assertEqual(result.json["error"]["reason"], "WRONG_STATE")
         self.assertIn("there is no program /no/such/shaped-trainer", result.message())
         self.assertIn("--trainer", result.message())
         self.assertEqual(self.expect(SUCCESS, "jobs").json["jobs"], [])
@@ -148,8 +156,8 @@ class Grown(DaemonCase):
         Creatures.make()
         super().setUpClass()
         cls.log = cls.folder / "log.jsonl"
-        result = cls.shapectl("bootstrap", "grown", "--scans", Creatures.folder / "scans", *Creatures.shapes(), *TINY,
-                              "--rounds", 2, "--log", cls.log)
+        result = cls.shapectl("bootstrap", "grown", "--scans", Creatures.folder / "scans", *Creatures.shapes(),
+                              *tiny("--rounds", 2, "--log", cls.log))
         if result.code != SUCCESS:
             raise RuntimeError(result.out + result.err + cls.daemon.log)
         cls.job = result.json
@@ -180,23 +188,29 @@ class Grown(DaemonCase):
         self.assertEqual(told[0]["round"], 1)
 
     def test_the_model_has_a_field_and_says_how_it_grew(self):
-        body = self.expect(SUCCESS, "describe", "grown").json["body"]
+        body = self.expect(SUCCESS, "describe", "grown@1").json["body"]
         self.assertTrue(body["field"])
         self.assertEqual(body["joined"], [round["joined"] for round in self.job["rounds"]])
         self.assertEqual(body["training_shapes"], 4 + sum(body["joined"]))
 
+    def registered(self, *words):
+        """Whether the fit of three modes quite converges is not the matter here."""
+        result = self.shapectl("register", "grown@1", *words)
+        self.assertIn(result.code, (SUCCESS, NOT_CONVERGED), result.out + result.err)
+        return result.json
+
     def test_registrations_use_the_field_unless_asked_not_to(self):
         scan = Creatures.folder / "scans/body_007.ply"
         with_field, without = self.folder / "with.ply", self.folder / "without.ply"
-        document = self.expect(SUCCESS, "register", "grown", scan, "-o", with_field).json
-        plain = self.expect(SUCCESS, "register", "grown", scan, "-o", without, "--without-field").json
+        document = self.registered(scan, "-o", with_field)
+        plain = self.registered(scan, "-o", without, "--without-field")
         self.assertNotIn("field_report", plain)
         self.assertIn("chamfer", document["field_report"])
         self.assertEqual(document["coefficients"], plain["coefficients"])
         self.assertNotEqual(with_field.read_bytes(), without.read_bytes())
-        sequence = self.expect(SUCCESS, "register", "grown", scan, scan).json["scans"]
+        sequence = self.registered(scan, scan)["scans"]
         self.assertTrue(all("field_report" in one for one in sequence))
-        sequence = self.expect(SUCCESS, "register", "grown", scan, scan, "--without-field").json["scans"]
+        sequence = self.registered(scan, scan, "--without-field")["scans"]
         self.assertFalse(any("field_report" in one for one in sequence))
 
     def test_a_model_grows_again_by_its_own_registrations_and_rig(self):
@@ -231,8 +245,8 @@ class Interrupted(unittest.TestCase):
         self.daemon = DaemonCase.daemon = Daemon(self.store, "--checkpoint-every", "0")
 
     def begin(self, name, *words):
-        result = DaemonCase.shapectl("bootstrap", name, "--scans", Creatures.folder / "scans", *Creatures.shapes(), *TINY,
-                                     "--rounds", 1, "--detach", *words)
+        result = DaemonCase.shapectl("bootstrap", name, "--scans", Creatures.folder / "scans", *Creatures.shapes(),
+                                     *tiny("--rounds", 1, "--detach", *words))
         self.assertEqual(result.code, SUCCESS, result.err + result.out)
         return result.json["id"]
 
@@ -299,7 +313,7 @@ class Interrupted(unittest.TestCase):
 
     def test_ctrl_c_of_who_follows_cancels(self):
         client = subprocess.Popen(DaemonCase.command("bootstrap", "grown", "--scans", Creatures.folder / "scans",
-                                                     *Creatures.shapes(), *TINY, "--epochs", 2000),
+                                                     *Creatures.shapes(), *tiny("--epochs", 2000)),
                                   stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
         self.addCleanup(client.kill)
         until = time.monotonic() + 60

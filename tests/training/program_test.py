@@ -7,6 +7,7 @@ import signal
 import struct
 import subprocess
 import tempfile
+import time
 import unittest
 
 import numpy
@@ -81,6 +82,19 @@ class Program(unittest.TestCase):
             self.assertGreater(resumed[-1]["step"], resumed[0]["step"])
             (self.folder / "checkpoint.safetensors").unlink()
 
+    def test_with_its_parent_it_ends_too_and_keeps_a_checkpoint(self):
+        self.write_job(1000000)
+        out = self.folder / "out"
+        subprocess.run(["sh", "-c", f"'{TRAINER}' --parent $$ '{self.folder}' > '{out}' & "
+                        f"until grep -q epoch '{out}'; do sleep 0.05; done"], check=True, timeout=120)
+        until = time.monotonic() + 60
+        while '"stopped"' not in out.read_text() and time.monotonic() < until:
+            time.sleep(0.05)
+        events = [json.loads(line)["event"] for line in out.read_text().splitlines()]
+        self.assertEqual(events[-2:], ["checkpoint", "stopped"])
+        # One that is not its parent (any more) cannot tell it when to end: it does not begin.
+        self.assertEqual(self.run_trainer("--parent", "4194305", self.folder)[0], 3)
+
     def test_bad_jobs_are_refused_in_words(self):
         self.write_job(0)
         status, events, errors = self.run_trainer(self.folder)
@@ -96,7 +110,7 @@ class Program(unittest.TestCase):
         for words in [], ["--help"], ["a", "b"]:
             status, _, errors = self.run_trainer(*words)
             self.assertEqual(status, 2)
-            self.assertIn("usage: shaped-trainer FOLDER", errors)
+            self.assertIn("usage: shaped-trainer [--parent PID] FOLDER", errors)
 
     def test_divergence_is_an_error(self):
         self.write_job(5, learning_rate=1e20, last_learning_rate=1e20, warm_up=0)

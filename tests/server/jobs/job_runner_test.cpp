@@ -111,6 +111,30 @@ TEST_CASE("a job runs, reports progress that never falls, and ends with its resu
   CHECK(std::is_sorted(fractions.begin(), fractions.end()));
 }
 
+TEST_CASE("what a job tells is there while it runs, and for whoever holds it") {
+  const Setting at;
+  SqliteJobRegistry registry(at.file);
+  std::promise<void> told, heard;
+  JobRunner runner(registry, kindsOf([&](const JobRun& run) {
+                     for (const auto* item : {"one", "two", "three"}) run.tell(item);
+                     told.set_value();
+                     heard.get_future().wait();
+                     return published();
+                   }),
+                   {}, at.jobs);
+  const auto id = runner.start(wanted()).id;
+  told.get_future().wait();
+  const auto news = runner.newsOf(id);
+  REQUIRE(news);
+  CHECK(runner.newsOf("no such job") == nullptr);
+  CHECK(news->from(0, 2) == std::vector<std::string>{"one", "two"});
+  CHECK(news->from(2, 2) == std::vector<std::string>{"three"});
+  CHECK(news->from(3, 2).empty());
+  heard.set_value();
+  waitForEnd(registry, id);
+  CHECK(news->from(0, 9).size() == 3);
+}
+
 TEST_CASE("a job's folder goes when it has ended") {
   const Setting at;
   SqliteJobRegistry registry(at.file);
