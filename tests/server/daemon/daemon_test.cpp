@@ -36,6 +36,21 @@ v1::UploadDatasetRequest frame(const Vertices& shape) {
   return message;
 }
 
+v1::UploadDatasetRequest scanHeader(std::uint32_t scans) {
+  v1::UploadDatasetRequest message;
+  message.mutable_header()->set_name("people");
+  message.mutable_header()->set_kind(v1::DATASET_KIND_SCANS);
+  message.mutable_header()->set_frames(scans);
+  return message;
+}
+
+v1::UploadDatasetRequest scan(const Vertices& points, const std::string& name) {
+  v1::UploadDatasetRequest message;
+  server::toProto(points, *message.mutable_scan()->mutable_scan()->mutable_positions());
+  message.mutable_scan()->set_name(name);
+  return message;
+}
+
 grpc::Status upload(const test::TestDaemon& daemon, const std::vector<v1::UploadDatasetRequest>& messages) {
   const auto stub = v1::Datasets::NewStub(daemon.channel());
   grpc::ClientContext context;
@@ -118,19 +133,6 @@ TEST_CASE("a dataset travels to the daemon and back out of it") {
 TEST_CASE("raw scans travel to the daemon, and faulty ones are refused by name") {
   const test::TestDaemon daemon;
   const auto dense = test::icosphere(2);
-  const auto scanHeader = [](std::uint32_t scans) {
-    v1::UploadDatasetRequest message;
-    message.mutable_header()->set_name("people");
-    message.mutable_header()->set_kind(v1::DATASET_KIND_SCANS);
-    message.mutable_header()->set_frames(scans);
-    return message;
-  };
-  const auto scan = [](const Vertices& points, const std::string& name) {
-    v1::UploadDatasetRequest message;
-    server::toProto(points, *message.mutable_scan()->mutable_scan()->mutable_positions());
-    message.mutable_scan()->set_name(name);
-    return message;
-  };
   const auto refused = [&](const std::vector<v1::UploadDatasetRequest>& messages, const std::string& text) {
     const auto status = upload(daemon, messages);
     CHECK(status.error_code() == grpc::INVALID_ARGUMENT);
@@ -154,6 +156,58 @@ TEST_CASE("raw scans travel to the daemon, and faulty ones are refused by name")
   CHECK(datasets(daemon).datasets(0).kind() == v1::DATASET_KIND_SCANS);
   CHECK(datasets(daemon).datasets(0).frames() == 1);
   CHECK(datasets(daemon).datasets(0).vertex_count() == 0);
+}
+
+TEST_CASE("a bootstrap is refused by what is wrong with it, before there is a job") {
+  server::DaemonOptions options;
+  options.trainer = "/no/such/shaped-trainer";
+  const test::TestDaemon daemon(options);
+  REQUIRE(upload(daemon, {scanHeader(1), scan(test::icosphere(2).vertices, "one.ply")}).ok());
+  REQUIRE(upload(daemon, {header("two", 2), frame(sphere.vertices), frame(2 * sphere.vertices)}).ok());
+  REQUIRE(upload(daemon, {header("four", 4), frame(sphere.vertices), frame(2 * sphere.vertices),
+                          frame(3 * sphere.vertices), frame(4 * sphere.vertices)})
+              .ok());
+  const auto stub = v1::Jobs::NewStub(daemon.channel());
+  const auto refused = [&](grpc::StatusCode code, const std::string& text,
+                           const std::function<void(v1::TrainRequest&, v1::Bootstrap&)>& change) {
+    v1::TrainRequest request;
+    request.set_model_name("grown");
+    request.set_dataset("four");
+    request.mutable_bootstrap()->set_scans("people");
+    change(request, *request.mutable_bootstrap());
+    grpc::ClientContext context;
+    v1::TrainResponse response;
+    const auto status = stub->Train(&context, request, &response);
+    CHECK(status.error_code() == code);
+    CHECK_THAT(status.error_message(), Contains(text));
+  };
+  const auto bad = grpc::INVALID_ARGUMENT;
+  refused(bad, "bootstrap.scans: is missing", [](auto&, auto& bootstrap) { bootstrap.clear_scans(); });
+  refused(bad, "bootstrap.scans: \"two\" holds shapes of one connectivity, want raw scans",
+          [](auto&, auto& bootstrap) { bootstrap.set_scans("two"); });
+  refused(bad, "bootstrap.field_scans: \"people\" holds 1 scans, want one for each of the 2 registrations",
+          [](auto&, auto& bootstrap) { bootstrap.set_field_scans("people"); });
+  refused(bad, "dataset: \"people\" holds raw scans, want shapes",
+          [](auto& request, auto&) { request.set_dataset("people"); });
+  refused(bad, "dataset: \"two\" holds 2 registrations; a bootstrap needs at least three",
+          [](auto& request, auto&) { request.set_dataset("two"); });
+  refused(bad, "bootstrap: rounds = 0, want >= 1", [](auto&, auto& bootstrap) { bootstrap.set_rounds(0); });
+  refused(bad, "bootstrap.field: learning_rate = -1",
+          [](auto&, auto& bootstrap) { bootstrap.mutable_field()->set_learning_rate(-1); });
+  refused(bad, "bootstrap.rig", [](auto&, auto& bootstrap) { bootstrap.set_rig("{}"); });
+  refused(bad, "bootstrap.rig: goes without template_model", [](auto&, auto& bootstrap) {
+    bootstrap.set_rig("{}");
+    bootstrap.mutable_template_model()->set_name("grown");
+  });
+  refused(grpc::NOT_FOUND, "grown",
+          [](auto&, auto& bootstrap) { bootstrap.mutable_template_model()->set_name("grown"); });
+  refused(grpc::NOT_FOUND, "there is no dataset \"nobody\"",
+          [](auto&, auto& bootstrap) { bootstrap.set_scans("nobody"); });
+  refused(grpc::FAILED_PRECONDITION, "there is no program /no/such/shaped-trainer", [](auto&, auto&) {});
+  grpc::ClientContext context;
+  v1::ListJobsResponse jobs;
+  REQUIRE(stub->List(&context, {}, &jobs).ok());
+  CHECK(jobs.jobs_size() == 0);
 }
 
 TEST_CASE("faulty uploads are refused by frame and leave nothing") {
