@@ -106,7 +106,7 @@ class Layers(unittest.TestCase):
         for path in (file for top in ("core", "server", "client", "trace", "tests") for file in (ROOT / top).rglob("CMakeLists.txt")):
             folder = str(path.parent.relative_to(ROOT))
             if re.search(r"shaped_(torch|training|server_trainer)\b(?!_tests)", path.read_text()):
-                self.assertIn(folder, ("core", "core/training", "server", "server/trainer", "tests"), path)
+                self.assertIn(folder, ("core", "core/training", "server", "server/trainer", "tests", "tests/benchmark"), path)
 
     def test_traces_stand_alone(self):
         for path in sources("trace"):
