@@ -7,6 +7,7 @@
 #include <set>
 
 #include "core/clothing/clothing_pairs.h"
+#include "core/clothing/first_fits.h"
 #include "core/mesh/quality.h"
 #include "core/numerics/error.h"
 #include "core/numerics/option_checks.h"
@@ -121,105 +122,6 @@ void tell(const ClothingOptions& options, const std::string& stage, double fract
   if (options.progress) options.progress({stage, fraction, 0});
 }
 
-/// A frame registered as if it were naked: not who is in it, but how they stand.
-struct FirstFit {
-  BodyState state;
-  double score = -1;
-};
-
-/// First fits of all frames. A pose far from rest is often missed by itself (legs that cross are taken for each other),
-/// so frames that fit badly are tried again from the poses of those that fit well, the nearest in time first.
-class FirstFits {
- public:
-  FirstFits(std::span<const Scan> scans, const BodyModel& model, std::span<const std::vector<Landmark>> landmarks,
-            const ClothingOptions& options)
-      : scans_(scans), model_(model), landmarks_(landmarks), options_(options), fits_(scans.size()) {
-    registration_ = options.registration;
-    registration_.stop = options.stop;
-  }
-
-  const std::vector<FirstFit>& run() {
-    const std::size_t alone = std::min(scans_.size(), std::size_t(options_.fitted_alone));
-    for (std::size_t i = 0; i < alone && !stopped(); ++i) {
-      const std::size_t frame = i * scans_.size() / alone;
-      tell(options_, "first fit " + std::to_string(frame + 1), 0.2 * double(i) / double(alone));
-      keep(frame, registerScan(scans_[frame], model_, landmarksOf(frame), registration_).solution);
-    }
-    for (std::size_t round = 0; round < scans_.size() && !stopped(); ++round) {
-      const auto frame = worstNeighbour();
-      if (!frame) break;
-      tell(options_, "first fit " + std::to_string(*frame + 1), 0.2 + 0.2 * double(round) / double(scans_.size()));
-      retry(*frame);
-      tried_.insert(*frame);
-    }
-    return fits_;
-  }
-
-  std::size_t best() const {
-    return std::size_t(std::max_element(fits_.begin(), fits_.end(), lessScore) - fits_.begin());
-  }
-
- private:
-  static bool lessScore(const FirstFit& one, const FirstFit& other) { return one.score < other.score; }
-  bool stopped() const { return options_.stop.stop_requested(); }
-  bool good(std::size_t frame) const { return fits_[frame].score >= options_.good_share * fits_[best()].score; }
-
-  std::vector<Landmark> landmarksOf(std::size_t frame) const {
-    return landmarks_.empty() ? std::vector<Landmark>() : landmarks_[frame];
-  }
-
-  void keep(std::size_t frame, const ScanRegistration& fit) {
-    if (fit.score > fits_[frame].score) fits_[frame] = {fit.state, fit.score};
-  }
-
-  /// Good frames, the nearest in time first.
-  std::vector<std::size_t> goodFramesNear(std::size_t frame) const {
-    std::vector<std::size_t> frames;
-    for (std::size_t f = 0; f < fits_.size(); ++f)
-      if (f != frame && good(f)) frames.push_back(f);
-    const auto away = [&](std::size_t f) { return f > frame ? f - frame : frame - f; };
-    std::stable_sort(frames.begin(), frames.end(), [&](std::size_t a, std::size_t b) { return away(a) < away(b); });
-    return frames;
-  }
-
-  /// The bad frame not yet tried again that stands nearest to a good one.
-  std::optional<std::size_t> worstNeighbour() const {
-    std::optional<std::size_t> chosen;
-    std::size_t least = scans_.size();
-    for (std::size_t f = 0; f < scans_.size(); ++f) {
-      if (good(f) || tried_.count(f)) continue;
-      const std::size_t nearest = goodFramesNear(f).front();
-      const std::size_t away = nearest > f ? nearest - f : f - nearest;
-      if (away < least) least = away, chosen = f;
-    }
-    return chosen;
-  }
-
-  void retry(std::size_t frame) {
-    const auto near = goodFramesNear(frame);
-    const ScanSurface surface(scans_[frame]);
-    for (std::size_t i = 0; i < near.size() && i < std::size_t(options_.retries) && !good(frame) && !stopped(); ++i) {
-      const BodyState& known = fits_[near[i]].state;
-      const auto start = startRigidly(surface, model_.posed(known).vertices(), model_.topology()->faces(),
-                                      registration_.start, options_.stop)
-                             .solution;
-      for (const auto& motion : {start.motion, start.runner_up})
-        if (!good(frame))
-          keep(frame, registerScanFrom(scans_[frame], model_, carried(model_, known, motion), landmarksOf(frame),
-                                       registration_)
-                          .solution);
-    }
-  }
-
-  std::span<const Scan> scans_;
-  const BodyModel& model_;
-  std::span<const std::vector<Landmark>> landmarks_;
-  const ClothingOptions& options_;
-  ScanRegistrationOptions registration_;
-  std::vector<FirstFit> fits_;
-  std::set<std::size_t> tried_;
-};
-
 /// The frames that fit well, best first: a missed posture must not speak of the identity.
 std::vector<std::size_t> goodFrames(const std::vector<FirstFit>& fits, std::span<const std::vector<Landmark>> landmarks,
                                     double good_share) {
@@ -239,6 +141,8 @@ std::vector<std::size_t> goodFrames(const std::vector<FirstFit>& fits, std::span
 ScanRegistrationOptions clothedRegistration() {
   ScanRegistrationOptions options;
   options.fit.pose_deviation = 1;
+  options.fit.levels.erase(options.fit.levels.begin());  // limbs are searched for, and cloth has no finest level
+  options.fit.levels.pop_back();
   return options;
 }
 

@@ -8,6 +8,7 @@
 
 #include "core/mesh/scan.h"
 #include "core/numerics/progress.h"
+#include "core/registration/limb_search.h"
 #include "core/registration/scan_registration.h"
 
 namespace shaped {
@@ -39,6 +40,7 @@ struct ClothingOptions {
   int passes = 2;                ///< postures and identity in turn, >= 1
   double tolerance = 2e-4;       ///< of a round: root mean square motion of the surface, m, > 0
   ScanRegistrationOptions registration = clothedRegistration();  ///< of first fits
+  LimbSearchOptions limbs;                                       ///< of first fits
   std::stop_token stop = {};
   ProgressSink progress = {};
 

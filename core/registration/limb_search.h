@@ -1,0 +1,42 @@
+#pragma once
+
+#include <optional>
+#include <stop_token>
+#include <string>
+
+#include "core/body/body_model.h"
+#include "core/registration/scan_surface.h"
+
+namespace shaped {
+
+struct LimbSearchOptions {
+  int samples = 500;            ///< points of either side that take part, >= 50
+  double loss_scale = 0.05;     ///< a point so far away counts half of one that has no partner, m, > 0
+  double largest_share = 0.25;  ///< of the surface that a limb's upper joint may carry, (0, 1]
+  double shortest_bone = 0.1;   ///< of the model's extent: upper joint to lower, > 0
+  double pose_deviation = 1;    ///< of the prior on both joints, rad, > 0
+  double least_gain = 0.02;     ///< of the limb's cost: what a turn must save to be taken, [0, 1)
+  bool backwards =
+      false;  ///< the last limb first: limbs that cross may be told apart in one order and not in the other
+  std::optional<std::string> firstViolation() const;  ///< "samples = 10, want >= 50"
+};
+
+/// What a search found.
+struct LimbSearch {
+  BodyState state;
+  int turned = 0;  ///< limbs that it turned
+};
+
+/// Seats limbs that a descent has missed. Closest points pull a bent arm, or a leg that strides out, to whatever lies
+/// nearest, and it stays there; so each limb (a joint that carries a small part of the body, and the next joint along
+/// its bone) is turned by a grid of rotations of both joints, the rest of the body held, and the best is taken. The
+/// cost of a grid point is the robust mean distance both ways: of the limb's points to the scan, and of the scan's
+/// points to the whole body, points that face another way having no partner. From the trunk outwards: upper arm before
+/// forearm. A coarse answer (steps of 25 degrees), to be refined by fitModelToScan.
+///
+/// start: trunk and head roughly right. Joints stay in the model's limits. Throws InvalidInput naming an option or the
+/// start.
+LimbSearch searchLimbs(const ScanSurface& scan, const BodyModel& model, const BodyState& start,
+                       const LimbSearchOptions& options = {}, const std::stop_token& stop = {});
+
+}  // namespace shaped
