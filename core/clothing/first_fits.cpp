@@ -19,16 +19,9 @@ BodyState withoutTurns(BodyState state) {
 
 }  // namespace
 
-FirstFits::FirstFits(std::span<const Scan> scans, const BodyModel& model,
+FirstFits::FirstFits(const std::deque<ScanSurface>& scans, const BodyModel& model,
                      std::span<const std::vector<Landmark>> landmarks, const ClothingOptions& options)
-    : scans_(scans),
-      model_(model),
-      landmarks_(landmarks),
-      options_(options),
-      registration_(options.registration),
-      fits_(scans.size()) {
-  registration_.stop = options.stop;
-}
+    : scans_(scans), model_(model), landmarks_(landmarks), options_(options), fits_(scans.size()) {}
 
 const std::vector<FirstFit>& FirstFits::run() {
   const auto tell = [&](std::size_t frame, double fraction) {
@@ -59,32 +52,35 @@ std::vector<Landmark> FirstFits::landmarksOf(std::size_t frame) const {
 }
 
 void FirstFits::descend(std::size_t frame, const BodyState& start) {
-  const auto fit = registerScanFrom(scans_[frame], model_, start, landmarksOf(frame), registration_).solution;
-  if (fit.score > fits_[frame].score) fits_[frame] = {fit.state, fit.score};
+  ModelFitOptions fit = options_.registration.fit;
+  fit.stop = options_.stop;
+  const auto state = fitModelToScan(scans_[frame], model_, start, landmarksOf(frame), fit).solution.state;
+  const double score = registrationScore(scans_[frame], model_, model_.posed(state).vertices());
+  if (score > fits_[frame].score) fits_[frame] = {state, score};
 }
 
-BodyState FirstFits::seated(const ScanSurface& surface, const BodyState& start, bool backwards) const {
+BodyState FirstFits::seated(std::size_t frame, const BodyState& start, bool backwards) const {
   auto options = options_.limbs;
   options.backwards = backwards;
-  return searchLimbs(surface, model_, start, options, options_.stop).state;
+  return searchLimbs(scans_[frame], model_, start, options, options_.stop).state;
 }
 
 void FirstFits::fitAlone(std::size_t frame) {
-  const ScanSurface surface(scans_[frame]);
   const auto& faces = model_.topology()->faces();
   const auto landmarks = landmarksOf(frame);
   if (landmarks.size() >= 3)
     return descend(frame,
                    placedState(model_, startFromLandmarks(landmarks, model_.parts().mean, faces).solution.motion));
-  const auto start = startRigidly(surface, model_.parts().mean, faces, registration_.start, options_.stop).solution;
-  ModelFitOptions coarse = registration_.fit;
+  const auto start =
+      startRigidly(scans_[frame], model_.parts().mean, faces, options_.registration.start, options_.stop).solution;
+  ModelFitOptions coarse = options_.registration.fit;
   coarse.levels.resize(1);
   coarse.stop = options_.stop;
   std::optional<ModelFit> chosen;
   for (const auto& motion : {start.motion, start.runner_up}) {
-    if (chosen && (start.margin >= registration_.doubtful_margin || stopped())) break;
+    if (chosen && (start.margin >= options_.registration.doubtful_margin || stopped())) break;
     const auto fit =
-        fitModelToScan(surface, model_, seated(surface, placedState(model_, motion)), landmarks, coarse).solution;
+        fitModelToScan(scans_[frame], model_, seated(frame, placedState(model_, motion)), landmarks, coarse).solution;
     if (!chosen || fit.report.chamfer < chosen->report.chamfer) chosen = fit;
   }
   descend(frame, chosen->state);
@@ -113,17 +109,16 @@ std::optional<std::size_t> FirstFits::badFrameNearGood() const {
 
 void FirstFits::retry(std::size_t frame) {
   const auto near = goodFramesNear(frame);
-  const ScanSurface surface(scans_[frame]);
   const auto attempt = [&](const BodyState& state) {
     for (const bool backwards : {false, true})
-      if (!good(frame) && !stopped()) descend(frame, seated(surface, state, backwards));
+      if (!good(frame) && !stopped()) descend(frame, seated(frame, state, backwards));
   };
   // With the trunk in place the search sees what it could not before.
   if (fits_[frame].score >= 0) attempt(withoutTurns(fits_[frame].state));
   for (std::size_t i = 0; i < near.size() && i < std::size_t(options_.retries); ++i) {
     const BodyState& known = fits_[near[i]].state;
-    const auto start = startRigidly(surface, model_.posed(known).vertices(), model_.topology()->faces(),
-                                    registration_.start, options_.stop)
+    const auto start = startRigidly(scans_[frame], model_.posed(known).vertices(), model_.topology()->faces(),
+                                    options_.registration.start, options_.stop)
                            .solution;
     for (const auto& motion : {start.motion, start.runner_up}) {
       if (good(frame) || stopped()) return;

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <deque>
 #include <optional>
 #include <set>
 #include <span>
@@ -20,9 +21,9 @@ struct FirstFit {
 /// fit well, the nearest in time first.
 class FirstFits {
  public:
-  /// All must outlive it; scans: usable, their normals outwards. landmarks: one list a scan, or none at all.
-  FirstFits(std::span<const Scan> scans, const BodyModel& model, std::span<const std::vector<Landmark>> landmarks,
-            const ClothingOptions& options);
+  /// All must outlive it; scans: their normals outwards. landmarks: one list a scan, or none at all.
+  FirstFits(const std::deque<ScanSurface>& scans, const BodyModel& model,
+            std::span<const std::vector<Landmark>> landmarks, const ClothingOptions& options);
 
   /// One a frame; those that were not reached when options.stop fired have a score below 0.
   const std::vector<FirstFit>& run();
@@ -39,16 +40,15 @@ class FirstFits {
   void retry(std::size_t frame);
   /// Descends from a start, and keeps the result if it is better.
   void descend(std::size_t frame, const BodyState& start);
-  BodyState seated(const ScanSurface& surface, const BodyState& start, bool backwards = false) const;
+  BodyState seated(std::size_t frame, const BodyState& start, bool backwards = false) const;
 
   std::vector<std::size_t> goodFramesNear(std::size_t frame) const;
   std::optional<std::size_t> badFrameNearGood() const;
 
-  std::span<const Scan> scans_;
+  const std::deque<ScanSurface>& scans_;
   const BodyModel& model_;
   std::span<const std::vector<Landmark>> landmarks_;
   const ClothingOptions& options_;
-  ScanRegistrationOptions registration_;
   std::vector<FirstFit> fits_;
   std::set<std::size_t> tried_;  ///< frames that were tried again
 };

@@ -18,10 +18,10 @@ namespace shaped {
 namespace {
 
 constexpr double kDegree = std::numbers::pi / 180;
-
-struct Limb {
-  std::int32_t upper, lower;  ///< joints; lower is a child of upper
-};
+constexpr int kDensity = 4;          ///< both sides are sampled so much denser than the rest of the body is read
+constexpr int kLimbPoints = 60;      ///< of each of a limb's two parts: small parts tell as much as large ones
+constexpr int kScanPoints = 120;     ///< of the scan that a limb has to explain
+constexpr double kExplained = 0.02;  ///< cost below which a scan point asks for nothing more
 
 /// Points with normals, as columns.
 struct Points {
@@ -59,26 +59,24 @@ class Limbs {
   Limbs(const BodyModel& model, const LimbSearchOptions& options) : model_(model) {
     const auto& skeleton = model.skeleton();
     const Vertices joints = model.restJoints(model.meanState().identity);
-    const auto carried = carriedShares();
+    carried_ = carriedShares();
     const double shortest = options.shortest_bone * boundingBoxDiagonal(model.parts().mean);
     for (std::int32_t upper = 1; upper < skeleton.jointCount(); ++upper) {
-      if (carried[std::size_t(upper)] > options.largest_share) continue;
+      if (carried_[std::size_t(upper)] > options.largest_share) continue;
       std::optional<std::int32_t> lower;
       for (std::int32_t j = upper + 1; j < skeleton.jointCount(); ++j)
         if (skeleton.parent(j) == upper && (joints.row(j) - joints.row(upper)).norm() >= shortest &&
-            (!lower || carried[std::size_t(j)] > carried[std::size_t(*lower)]))
+            (!lower || carried_[std::size_t(j)] > carried_[std::size_t(*lower)]))
           lower = j;
       if (lower) all_.push_back({upper, *lower});
     }
   }
 
   const std::vector<Limb>& all() const { return all_; }
+  /// Share of the surface that the joint and those below it carry.
+  double share(std::int32_t joint) const { return carried_[std::size_t(joint)]; }
 
-  /// Whether the joint is `ancestor` or below it.
-  bool below(std::int32_t joint, std::int32_t ancestor) const {
-    while (joint > ancestor) joint = model_.skeleton().parent(joint);
-    return joint == ancestor;
-  }
+  bool below(std::int32_t joint, std::int32_t ancestor) const { return hangsBelow(model_.skeleton(), joint, ancestor); }
 
   std::int32_t foremostJoint(Eigen::Index vertex) const {
     std::int32_t joint = 0;
@@ -100,45 +98,44 @@ class Limbs {
   }
 
   const BodyModel& model_;
+  std::vector<double> carried_;
   std::vector<Limb> all_;
 };
 
-/// The scan's side of the cost.
+/// The scan's side of the cost. All costs lie in [0, 1].
 class ScanSide {
  public:
   ScanSide(const ScanSurface& scan, const LimbSearchOptions& options)
       : oriented_(scan.hasOrientedNormals()),
         square_(options.loss_scale * options.loss_scale),
-        dense_(everyFew(scan.points(), scan.normals(), 4 * options.samples)),
-        sparse_(everyFew(scan.points(), scan.normals(), options.samples)),
-        tree_(dense_.points) {}
+        samples_(everyFew(scan.points(), scan.normals(), kDensity * options.samples)),
+        tree_(samples_.points) {}
 
-  /// Of a body's points: the sum of their costs against the scan, each 0 to 1.
+  const SurfaceSamples& samples() const { return samples_; }
+
+  /// The mean over the body's points of their costs against the scan.
   double costOf(const Points& body) const {
     double sum = 0;
     for (Eigen::Index i = 0; i < body.size(); ++i) {
       const NearPoint found = tree_.nearest(body.positions.col(i).transpose());
-      const double cosine = dense_.normals.row(found.index).dot(body.normals.col(i));
+      const double cosine = samples_.normals.row(found.index).dot(body.normals.col(i));
       sum += facing(cosine) ? loss(found.squared_distance) : 1;
     }
-    return sum;
+    return sum / double(std::max<Eigen::Index>(1, body.size()));
   }
 
-  /// Of each of the scan's points: its cost against the body's points, at most what it has already.
-  void lower(const Points& body, Eigen::VectorXd& costs) const {
+  /// Of each of some of the scan's points: its cost against the body's points, at most what it has already.
+  void lower(const Points& body, const Points& scan, Eigen::VectorXd& costs) const {
     for (Eigen::Index s = 0; s < costs.size(); ++s) {
-      if (costs[s] < 0.02) continue;  // explained well enough by another part
+      if (costs[s] < kExplained) continue;
       double least = std::numeric_limits<double>::infinity();
-      const Eigen::Vector3d point = sparse_.points.row(s).transpose(), normal = sparse_.normals.row(s).transpose();
       for (Eigen::Index i = 0; i < body.size(); ++i) {
-        const double squared = (body.positions.col(i) - point).squaredNorm();
-        if (squared < least && facing(body.normals.col(i).dot(normal))) least = squared;
+        const double squared = (body.positions.col(i) - scan.positions.col(s)).squaredNorm();
+        if (squared < least && facing(body.normals.col(i).dot(scan.normals.col(s)))) least = squared;
       }
       costs[s] = std::min(costs[s], loss(least));
     }
   }
-
-  Eigen::VectorXd unexplained() const { return Eigen::VectorXd::Ones(sparse_.points.rows()); }
 
  private:
   bool facing(double cosine) const { return (oriented_ ? cosine : std::abs(cosine)) >= 0.3; }
@@ -146,7 +143,7 @@ class ScanSide {
 
   bool oriented_;
   double square_;
-  SurfaceSamples dense_, sparse_;
+  SurfaceSamples samples_;
   PointTree tree_;
 };
 
@@ -158,7 +155,7 @@ class Search {
         options_(options),
         limbs_(model, options),
         scan_(scan, options),
-        chosen_(verticesByArea(model.topology()->faces(), model.parts().mean, options.samples)) {
+        chosen_(verticesByArea(model.topology()->faces(), model.parts().mean, kDensity * options.samples)) {
     for (const auto v : chosen_) joints_.push_back(limbs_.foremostJoint(v));
   }
 
@@ -174,27 +171,31 @@ class Search {
   }
 
  private:
-  /// The samples of the posed body that `wanted` says yes to, by their foremost joint.
+  /// About `most` samples of the posed body among those that `wanted` says yes to, by their foremost joint.
   template <class Wanted>
-  Points part(const Vertices& surface, const Vertices& normals, const Wanted& wanted) const {
+  Points part(const PosedSkin& skin, const Vertices& normals, int most, const Wanted& wanted) const {
     std::vector<std::int32_t> taken;
     for (std::size_t i = 0; i < chosen_.size(); ++i)
       if (wanted(joints_[i])) taken.push_back(chosen_[i]);
-    Points points(Eigen::Index(taken.size()));
-    for (std::size_t i = 0; i < taken.size(); ++i) {
-      points.positions.col(Eigen::Index(i)) = surface.row(taken[i]).transpose();
-      points.normals.col(Eigen::Index(i)) = normals.row(taken[i]).transpose();
+    const std::size_t stride = std::max<std::size_t>(1, taken.size() / std::size_t(most));
+    Points points(Eigen::Index((taken.size() + stride - 1) / stride));
+    for (Eigen::Index i = 0; i < points.size(); ++i) {
+      const auto vertex = taken[std::size_t(i) * stride];
+      points.positions.col(i) = skin.vertices().row(vertex).transpose();
+      points.normals.col(i) = normals.row(vertex).transpose();
     }
     return points;
   }
 
-  /// The limb as it stands, and cut from the rest.
+  /// A limb, cut from the rest.
   struct Cut {
-    Points upper, lower;          ///< the parts that the two joints carry, unturned: as in the rest pose of both joints
+    Points upper, lower;          ///< the parts that the two joints carry, both joints at rest
     Eigen::Vector3d shoulder;     ///< where the upper joint stands
     Eigen::Vector3d bone;         ///< from it to the lower one, upper joint at rest
     Eigen::Matrix3d above;        ///< how the upper joint's parent stands in the world
-    Eigen::VectorXd unexplained;  ///< costs of the scan's points by the rest of the body
+    Points open;                  ///< points of the scan within reach that the rest of the body does not explain
+    Eigen::VectorXd unexplained;  ///< their costs by the rest of the body
+    double scan_weight;           ///< of one of them, so that a limb's own share of the scan would weigh 1
   };
 
   Cut cutOff(const Limb& limb, const BodyState& state) const {
@@ -203,16 +204,52 @@ class Search {
     straight.pose.rotations.row(limb.lower).setZero();
     const PosedSkin skin = model_.posed(straight);
     const Vertices normals = vertexNormals(model_.topology()->faces(), skin.vertices());
-    const auto part = [&](const auto& wanted) { return this->part(skin.vertices(), normals, wanted); };
+    const auto part = [&](int most, const auto& wanted) { return this->part(skin, normals, most, wanted); };
     const auto& bones = skin.skeleton();
-    Cut cut{part([&](std::int32_t j) { return limbs_.below(j, limb.upper) && !limbs_.below(j, limb.lower); }),
-            part([&](std::int32_t j) { return limbs_.below(j, limb.lower); }),
-            bones.joints.row(limb.upper).transpose(),
-            (bones.joints.row(limb.lower) - bones.joints.row(limb.upper)).transpose(),
-            bones.rotations[std::size_t(model_.skeleton().parent(limb.upper))],
-            scan_.unexplained()};
-    scan_.lower(part([&](std::int32_t j) { return !limbs_.below(j, limb.upper); }), cut.unexplained);
+    Cut cut{
+        part(kLimbPoints, [&](std::int32_t j) { return limbs_.below(j, limb.upper) && !limbs_.below(j, limb.lower); }),
+        part(kLimbPoints, [&](std::int32_t j) { return limbs_.below(j, limb.lower); }),
+        bones.joints.row(limb.upper).transpose(),
+        (bones.joints.row(limb.lower) - bones.joints.row(limb.upper)).transpose(),
+        bones.rotations[std::size_t(model_.skeleton().parent(limb.upper))],
+        Points(0),
+        {},
+        0};
+    leaveOpen(part(options_.samples, [&](std::int32_t j) { return !limbs_.below(j, limb.upper); }), limb, cut);
     return cut;
+  }
+
+  /// What the limb has to explain of the scan.
+  void leaveOpen(const Points& rest, const Limb& limb, Cut& cut) const {
+    double reach = 0;
+    for (const auto* points : {&cut.upper, &cut.lower})
+      if (points->size() > 0)
+        reach = std::max(reach, (points->positions.colwise() - cut.shoulder).colwise().norm().maxCoeff());
+    reach += 3 * options_.loss_scale;
+    const auto& samples = scan_.samples();
+    std::vector<Eigen::Index> near;
+    for (Eigen::Index s = 0; s < samples.points.rows(); ++s)
+      if ((samples.points.row(s).transpose() - cut.shoulder).norm() <= reach) near.push_back(s);
+    Points points(Eigen::Index(near.size()));
+    for (std::size_t i = 0; i < near.size(); ++i) {
+      points.positions.col(Eigen::Index(i)) = samples.points.row(near[i]).transpose();
+      points.normals.col(Eigen::Index(i)) = samples.normals.row(near[i]).transpose();
+    }
+    Eigen::VectorXd costs = Eigen::VectorXd::Ones(points.size());
+    scan_.lower(rest, points, costs);
+    std::vector<Eigen::Index> open;
+    for (Eigen::Index i = 0; i < costs.size(); ++i)
+      if (costs[i] >= kExplained) open.push_back(i);
+    const std::size_t stride = std::max<std::size_t>(1, open.size() / std::size_t(kScanPoints));
+    cut.open = Points(Eigen::Index((open.size() + stride - 1) / stride));
+    cut.unexplained.resize(cut.open.size());
+    for (Eigen::Index i = 0; i < cut.open.size(); ++i) {
+      const auto from = open[std::size_t(i) * stride];
+      cut.open.positions.col(i) = points.positions.col(from);
+      cut.open.normals.col(i) = points.normals.col(from);
+      cut.unexplained[i] = costs[from];
+    }
+    cut.scan_weight = double(stride) / (limbs_.share(limb.upper) * double(samples.points.rows()));
   }
 
   /// Both joints' rotations relative to their parents.
@@ -227,18 +264,19 @@ class Search {
     const Points moved = cut.upper.turned(world, cut.shoulder);
     const Eigen::Vector3d elbow = cut.shoulder + world * cut.bone;
     Eigen::VectorXd explained = cut.unexplained;
-    scan_.lower(moved, explained);
-    const double upper_cost = scan_.costOf(moved);
+    scan_.lower(moved, cut.open, explained);
+    const double share = limbs_.share(limb.lower) / limbs_.share(limb.upper);
+    const double small = std::max(share, 0.3);  // a hand's turn must not drown in its forearm
+    const double upper_cost = (1 - small) * scan_.costOf(moved);
     for (const auto& lower : lowers) {
       if (!allowed(limb, {upper, lower})) continue;
       Points bent = cut.lower.turned(world * cut.above * lower * cut.above.transpose(), cut.shoulder);
       bent.positions.colwise() += elbow - (world * cut.above * lower * cut.above.transpose() * cut.bone + cut.shoulder);
-      double cost =
-          upper_cost + scan_.costOf(bent) + double(cut.upper.size() + cut.lower.size()) * priorOf({upper, lower});
+      double cost = upper_cost + small * scan_.costOf(bent) + priorOf({upper, lower});
       if (cost >= least) continue;
       Eigen::VectorXd left = explained;
-      scan_.lower(bent, left);
-      cost += left.sum();
+      scan_.lower(bent, cut.open, left);
+      cost += cut.scan_weight * left.sum();
       if (cost < least) least = cost, best = {upper, lower};
     }
   }
@@ -276,7 +314,7 @@ class Search {
 
   double priorOf(const Turn& turn) const {
     const double squares = axisAngle(turn.upper).squaredNorm() + axisAngle(turn.lower).squaredNorm();
-    return 0.02 * squares / (options_.pose_deviation * options_.pose_deviation);
+    return options_.prior * squares;
   }
 
   bool allowed(const Limb& limb, const Turn& turn) const {
@@ -305,9 +343,19 @@ std::optional<std::string> LimbSearchOptions::firstViolation() const {
   if (!(largest_share > 0 && largest_share <= 1))
     return "largest_share = " + std::to_string(largest_share) + ", want (0, 1]";
   if (auto problem = unlessPositive("shortest_bone", shortest_bone)) return problem;
-  if (auto problem = unlessPositive("pose_deviation", pose_deviation)) return problem;
+  if (!(prior >= 0) || !std::isfinite(prior)) return "prior = " + std::to_string(prior) + ", want >= 0";
   if (!(least_gain >= 0 && least_gain < 1)) return "least_gain = " + std::to_string(least_gain) + ", want [0, 1)";
   return std::nullopt;
+}
+
+std::vector<Limb> limbsOf(const BodyModel& model, const LimbSearchOptions& options) {
+  if (const auto problem = options.firstViolation()) throw InvalidInput("limb search options", *problem);
+  return Limbs(model, options).all();
+}
+
+bool hangsBelow(const Skeleton& skeleton, std::int32_t joint, std::int32_t ancestor) {
+  while (joint > ancestor) joint = skeleton.parent(joint);  // parents come first
+  return joint == ancestor;
 }
 
 LimbSearch searchLimbs(const ScanSurface& scan, const BodyModel& model, const BodyState& start,

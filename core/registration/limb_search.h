@@ -3,6 +3,7 @@
 #include <optional>
 #include <stop_token>
 #include <string>
+#include <vector>
 
 #include "core/body/body_model.h"
 #include "core/registration/scan_surface.h"
@@ -14,12 +15,24 @@ struct LimbSearchOptions {
   double loss_scale = 0.05;     ///< a point so far away counts half of one that has no partner, m, > 0
   double largest_share = 0.25;  ///< of the surface that a limb's upper joint may carry, (0, 1]
   double shortest_bone = 0.1;   ///< of the model's extent: upper joint to lower, > 0
-  double pose_deviation = 1;    ///< of the prior on both joints, rad, > 0
+  double prior = 0.04;          ///< what a joint turned by one radian costs; a limb without a partner costs 2, >= 0
   double least_gain = 0.02;     ///< of the limb's cost: what a turn must save to be taken, [0, 1)
   bool backwards =
       false;  ///< the last limb first: limbs that cross may be told apart in one order and not in the other
   std::optional<std::string> firstViolation() const;  ///< "samples = 10, want >= 50"
 };
+
+/// A limb as the search turns it.
+struct Limb {
+  std::int32_t upper, lower;  ///< joints; lower is a child of upper
+};
+
+/// The limbs of a model, those nearer to the root first: upper joints carry at most `largest_share` of the surface, and
+/// the lower one stands at least `shortest_bone` away. Throws InvalidInput naming an option.
+std::vector<Limb> limbsOf(const BodyModel& model, const LimbSearchOptions& options = {});
+
+/// Whether a joint is `ancestor` or hangs below it.
+bool hangsBelow(const Skeleton& skeleton, std::int32_t joint, std::int32_t ancestor);
 
 /// What a search found.
 struct LimbSearch {

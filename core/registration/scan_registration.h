@@ -53,6 +53,9 @@ Solved<ScanRegistration> registerScanFrom(const Scan& scan, const BodyModel& mod
                                           const std::vector<Landmark>& landmarks,
                                           const ScanRegistrationOptions& options = {});
 
+/// ScanRegistration::score of a surface (V x 3, of the model).
+double registrationScore(const ScanSurface& scan, const BodyModel& model, const Vertices& surface);
+
 /// Whether the normals of a scan point inwards on the whole: the mean of n . (x - centre), which for a closed surface
 /// is three times its volume, is negative. False without normals.
 bool pointsInwards(const Scan& scan);
