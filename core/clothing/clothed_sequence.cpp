@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <vector>
 
 #include "core/clothing/limb_poses.h"
 #include "core/mesh/quality.h"
@@ -10,7 +11,7 @@ namespace shaped {
 
 ClothedSequence::ClothedSequence(const std::deque<ScanSurface>& scans, const BodyModel& model,
                                  std::span<const std::vector<Landmark>> landmarks, const ClothingOptions& options)
-    : model_(model), options_(options), limbs_(limbsOf(model, options.limbs)) {
+    : scans_(scans), model_(model), options_(options), limbs_(limbsOf(model, options.limbs)) {
   static const std::vector<Landmark> none;
   for (std::size_t f = 0; f < scans.size(); ++f)
     frames_.emplace_back(scans[f], model, landmarks.empty() ? none : landmarks[f], options);
@@ -38,14 +39,37 @@ void ClothedSequence::reseatLimbs(BodySequence& state, std::size_t frame, const 
   std::vector<Pose> others;
   for (const auto f : neighbours) others.push_back(state.poses[f]);
   const Vertices joints = model_.restJoints(state.identity);
-  double least = frames_[frame].misfit(surfaceOf(state.identity, state.poses[frame]));
   for (const auto& limb : limbs_)
-    for (const auto& start : otherLimbPoses(model_.skeleton(), joints, limb, state.poses[frame], others)) {
-      if (options_.stop.stop_requested()) return;
-      const auto other = settled({state.identity, {start}}, {frame}, terms, tightness, {false, true}, 5);
-      const double misfit = frames_[frame].misfit(surfaceOf(state.identity, other.solution.poses[0]));
-      if (misfit < least) least = misfit, state.poses[frame] = other.solution.poses[0];
-    }
+    keepBest(state, frame, otherLimbPoses(model_.skeleton(), joints, limb, state.poses[frame], others), terms,
+             tightness);
+}
+
+void ClothedSequence::searchLimbs(BodySequence& state, std::size_t frame, const ClothingTerms& terms,
+                                  const Eigen::VectorXd& tightness) const {
+  std::vector<Pose> starts;
+  for (const bool backwards : {false, true}) {
+    auto search = options_.limbs;
+    search.backwards = backwards;
+    Pose straight = state.poses[frame];
+    for (const auto& limb : limbs_)
+      for (std::int32_t j = limb.upper; j < model_.skeleton().jointCount(); ++j)
+        if (hangsBelow(model_.skeleton(), j, limb.upper)) straight.rotations.row(j).setZero();
+    for (const auto& start : {state.poses[frame], straight})
+      starts.push_back(
+          shaped::searchLimbs(scans_[frame], model_, {state.identity, start}, search, options_.stop).state.pose);
+  }
+  keepBest(state, frame, starts, terms, tightness);
+}
+
+void ClothedSequence::keepBest(BodySequence& state, std::size_t frame, std::span<const Pose> starts,
+                               const ClothingTerms& terms, const Eigen::VectorXd& tightness) const {
+  double least = frames_[frame].misfit(surfaceOf(state.identity, state.poses[frame]));
+  for (const auto& start : starts) {
+    if (options_.stop.stop_requested()) return;
+    const auto other = settled({state.identity, {start}}, {frame}, terms, tightness, {false, true}, 5);
+    const double misfit = frames_[frame].misfit(surfaceOf(state.identity, other.solution.poses[0]));
+    if (misfit < least) least = misfit, state.poses[frame] = other.solution.poses[0];
+  }
 }
 
 Eigen::VectorXd ClothedSequence::tightness(const BodySequence& state, const std::vector<std::size_t>& frames) const {
@@ -65,7 +89,12 @@ Eigen::VectorXd ClothedSequence::tightness(const BodySequence& state, const std:
     const double tight = seen >= 3 ? square / (square + squares / (seen - 1)) : 0;
     tightness[v] = tight * tight;
   }
-  return tightness;
+  // Relative to the tightest tenth: else a body that has become too thin, all of whose gaps vary, would find no data
+  // to hold it, and shrink on.
+  std::vector<double> sorted(tightness.begin(), tightness.end());
+  const auto tenth = sorted.begin() + std::ptrdiff_t(0.9 * double(count - 1));
+  std::nth_element(sorted.begin(), tenth, sorted.end());
+  return *tenth > 0 ? Eigen::VectorXd(tightness / *tenth).cwiseMin(1) : Eigen::VectorXd();
 }
 
 ClothedFrame ClothedSequence::measured(const BodySequence& state, std::size_t frame, const Outcome& outcome) const {

@@ -56,7 +56,6 @@ std::vector<SurfaceTarget> ClothingPairs::find(const Vertices& surface, const Cl
   const RobustLoss inside{RobustLoss::Kind::kGemanMcClure, terms.loss_scale};
   const RobustLoss outside{RobustLoss::Kind::kGemanMcClure, options_.outside_scale};
   std::vector<SurfaceTarget> targets;
-  double sum = 0;
   for (std::size_t i = 0; i < chosen_.size(); ++i) {
     const auto v = chosen_[i];
     const auto pair = pairOf(surface, normals, v);
@@ -65,11 +64,11 @@ std::vector<SurfaceTarget> ClothingPairs::find(const Vertices& surface, const Cl
     const double tight = tightness.size() > 0 ? tightness[Eigen::Index(i)] : 1;
     const double weight = pair->height > 0 ? (terms.weights.data + terms.weights.cloth) * outside.weight(square)
                                            : terms.weights.data * tight * inside.weight(square);
-    sum += weight;
     targets.push_back(
         {{v, v, v}, Eigen::Vector3d::UnitX(), pair->position.transpose(), pair->normal.transpose(), weight});
   }
-  const auto pulls = landmarkTargets(landmarks_, model_.topology()->faces(), terms.weights.landmarks * sum);
+  const auto pulls =
+      landmarkTargets(landmarks_, model_.topology()->faces(), terms.weights.landmarks * double(targets.size()));
   targets.insert(targets.end(), pulls.begin(), pulls.end());
   return targets;
 }

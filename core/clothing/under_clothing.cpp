@@ -45,10 +45,11 @@ class Estimation {
  public:
   Estimation(const std::deque<ScanSurface>& scans, const BodyModel& model,
              std::span<const std::vector<Landmark>> landmarks, const ClothingOptions& options)
-      : options_(options), sequence_(scans, model, landmarks, options), outcomes_(scans.size()) {}
+      : model_(model), options_(options), sequence_(scans, model, landmarks, options), outcomes_(scans.size()) {}
 
   Solved<ClothedBody> run(const std::vector<FirstFit>& fits, std::size_t best) {
-    state_.identity = fits[best].state.identity;
+    state_.identity = Eigen::VectorXd::Zero(model_.modeCount());
+    state_.identity.head(fits[best].state.identity.size()) = fits[best].state.identity;
     for (const auto& fit : fits) state_.poses.push_back(fit.state.pose);
     for (std::size_t f = 0; f < fits.size(); ++f)
       if (fits[f].score >= options_.good_share * fits[best].score) trusted_.push_back(f);
@@ -59,9 +60,10 @@ class Estimation {
       static_cast<Outcome&>(result) = sequence_.settleIdentity(state_, trusted_, termsOf(pass), tightness);
       ClothingTerms postures = termsOf(pass);
       postures.loss_scale = options_.posture_loss_scale;
-      if (pass <= 1) reseat(postures, pass == 0);
-      settlePostures(postures, {});
-      tell(options_, "pass " + std::to_string(pass + 1), 0.6 + 0.4 * double(pass + 1) / double(options_.passes));
+      if (pass == std::min(1, options_.passes - 1)) reseat(postures, tightness);
+      settlePostures(postures, tightness);
+      if (pass > 0)
+        tell(options_, "pass " + std::to_string(pass + 1), 0.7 + 0.3 * double(pass + 1) / double(options_.passes));
       if (options_.stop.stop_requested()) result.termination = Termination::kCancelled;
       if (result.termination == Termination::kCancelled) break;
     }
@@ -88,11 +90,12 @@ class Estimation {
   }
 
   /// Limbs in other ways, and as they stand in frames nearby; then who is trusted is decided anew.
-  void reseat(const ClothingTerms& terms, bool first) {
+  void reseat(const ClothingTerms& terms, const Eigen::VectorXd& tightness) {
     for (std::size_t f = 0; f < sequence_.size() && !options_.stop.stop_requested(); ++f) {
-      tell(options_, "limbs of frame " + std::to_string(f + 1),
-           0.5 + (first ? 0 : 0.05) + 0.05 * double(f) / double(sequence_.size()));
-      sequence_.reseatLimbs(state_, f, nearest(f), terms, {});
+      tell(options_, "limbs of frame " + std::to_string(f + 1), 0.6 + 0.1 * double(f) / double(sequence_.size()));
+      sequence_.reseatLimbs(state_, f, nearest(f), terms, tightness);
+      const bool missed = std::find(trusted_.begin(), trusted_.end(), f) == trusted_.end();
+      if (missed) sequence_.searchLimbs(state_, f, terms, tightness);
     }
     const auto frames = measured();
     trusted_.clear();
@@ -121,6 +124,7 @@ class Estimation {
     return frames;
   }
 
+  const BodyModel& model_;
   const ClothingOptions& options_;
   ClothedSequence sequence_;
   BodySequence state_;
@@ -143,6 +147,7 @@ std::optional<std::string> ClothingOptions::firstViolation() const {
   if (retries < 1) return "retries = " + std::to_string(retries) + ", want >= 1";
   if (points < 50) return "points = " + std::to_string(points) + ", want >= 50";
   if (rounds < 1) return "rounds = " + std::to_string(rounds) + ", want >= 1";
+  if (first_modes < 1) return "first_modes = " + std::to_string(first_modes) + ", want >= 1";
   if (passes < 1) return "passes = " + std::to_string(passes) + ", want >= 1";
   for (const auto& [name, weights] : {std::pair{"first", first}, {"last", last}})
     for (const double weight : {weights.landmarks, weights.data, weights.cloth})
@@ -175,7 +180,8 @@ Solved<ClothedBody> estimateUnderClothing(std::span<const Scan> scans, const Bod
   requireInput(scans, landmarks, *model.topology());
   std::deque<ScanSurface> surfaces;
   for (const auto& scan : scans) surfaces.emplace_back(pointsInwards(scan) ? flipped(scan) : scan);
-  FirstFits first_fits(surfaces, model, landmarks, options);
+  const BodyModel coarse = model.truncated(std::min<Eigen::Index>(options.first_modes, model.modeCount()));
+  FirstFits first_fits(surfaces, coarse, landmarks, options);
   const auto& fits = first_fits.run();
   if (options.stop.stop_requested()) {
     Solved<ClothedBody> nothing;

@@ -27,8 +27,9 @@ struct ClothingOptions {
   int fitted_alone = 16;     ///< frames, spread over the sequence, that are registered by themselves, >= 1
   double good_share = 0.96;  ///< of the best first fit's score: what fits worse is tried again from others, 0 to 1
   int retries = 2;           ///< good frames nearby whose poses are tried in first fits, and limb by limb, >= 1
+  int first_modes = 20;  ///< of the model in first fits, which take cloth for body: more would follow its folds, >= 1
   ClothingWeights first = {1, 1, 1};    ///< of the first pass; each pass goes by the same factor towards the last
-  ClothingWeights last = {0.5, 1, 20};  ///< of the last pass
+  ClothingWeights last = {0.5, 1, 30};  ///< of the last pass
   double first_loss_scale = 0.08;       ///< of the robust loss of points inside, for the identity, m, > 0
   double last_loss_scale = 0.015;       ///< in the last pass: by then only skin and tight cloth lie near, m, > 0
   double posture_loss_scale = 0.08;     ///< of points inside, for postures: cloth hangs loose, m, > 0

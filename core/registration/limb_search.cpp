@@ -296,7 +296,7 @@ class Search {
     const auto lowers = turnsOf(forearm, {45, 90}, {0});
     for (const auto& upper : turnsOf(bone, {35, 70}, {0, -50, 50})) tryLower(limb, cut, upper, lowers, least, best);
     for (const double step : {22.0, 11.0}) refine(limb, cut, bone, forearm, step, least, best);
-    if (!(least < (1 - options_.least_gain) * first)) return false;
+    if (!(least < first - options_.least_gain)) return false;
     state.pose.rotations.row(limb.upper) = axisAngle(best.upper).transpose();
     state.pose.rotations.row(limb.lower) = axisAngle(best.lower).transpose();
     return true;
@@ -344,7 +344,8 @@ std::optional<std::string> LimbSearchOptions::firstViolation() const {
     return "largest_share = " + std::to_string(largest_share) + ", want (0, 1]";
   if (auto problem = unlessPositive("shortest_bone", shortest_bone)) return problem;
   if (!(prior >= 0) || !std::isfinite(prior)) return "prior = " + std::to_string(prior) + ", want >= 0";
-  if (!(least_gain >= 0 && least_gain < 1)) return "least_gain = " + std::to_string(least_gain) + ", want [0, 1)";
+  if (!(least_gain >= 0) || !std::isfinite(least_gain))
+    return "least_gain = " + std::to_string(least_gain) + ", want >= 0";
   return std::nullopt;
 }
 

@@ -16,7 +16,7 @@ struct LimbSearchOptions {
   double largest_share = 0.25;  ///< of the surface that a limb's upper joint may carry, (0, 1]
   double shortest_bone = 0.1;   ///< of the model's extent: upper joint to lower, > 0
   double prior = 0.04;          ///< what a joint turned by one radian costs; a limb without a partner costs 2, >= 0
-  double least_gain = 0.02;     ///< of the limb's cost: what a turn must save to be taken, [0, 1)
+  double least_gain = 0.02;     ///< what a turn must save to be taken, in the same measure, >= 0
   bool backwards =
       false;  ///< the last limb first: limbs that cross may be told apart in one order and not in the other
   std::optional<std::string> firstViolation() const;  ///< "samples = 10, want >= 50"

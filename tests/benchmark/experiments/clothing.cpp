@@ -1,6 +1,7 @@
 #include "core/clothing/under_clothing.h"
 
 #include <cstdlib>
+#include <filesystem>
 #include <nlohmann/json.hpp>
 
 #include "core/io/file.h"
