@@ -1,6 +1,7 @@
 #include "core/clothing/clothing_pairs.h"
 
 #include <cmath>
+#include <limits>
 #include <numbers>
 
 #include "core/mesh/quality.h"
@@ -8,8 +9,15 @@
 #include "core/registration/surface_samples.h"
 
 namespace shaped {
+namespace {
 
-ClothingPairs::ClothingPairs(const Scan& scan, const BodyModel& model, const std::vector<Landmark>& landmarks,
+constexpr int kScanPoints = 1500;  ///< of the scan that misfit looks at
+
+double bounded(double distance, double scale) { return distance * distance / (scale * scale + distance * distance); }
+
+}  // namespace
+
+ClothingPairs::ClothingPairs(const ScanSurface& scan, const BodyModel& model, const std::vector<Landmark>& landmarks,
                              const ClothingOptions& options)
     : scan_(scan),
       model_(model),
@@ -32,37 +40,71 @@ std::optional<ClothingPairs::Pair> ClothingPairs::pairOf(const Vertices& surface
   return pair;
 }
 
-std::vector<SurfaceTarget> ClothingPairs::find(const Vertices& surface, const ClothingWeights& weights) const {
+Eigen::VectorXd ClothingPairs::gaps(const Vertices& surface) const {
   const Vertices normals = vertexNormals(model_.topology()->faces(), surface);
-  const RobustLoss inside{RobustLoss::Kind::kGemanMcClure, options_.loss_scale};
+  Eigen::VectorXd gaps(Eigen::Index(chosen_.size()));
+  for (std::size_t i = 0; i < chosen_.size(); ++i) {
+    const auto pair = pairOf(surface, normals, chosen_[i]);
+    gaps[Eigen::Index(i)] = pair ? -pair->height : std::numeric_limits<double>::quiet_NaN();
+  }
+  return gaps;
+}
+
+std::vector<SurfaceTarget> ClothingPairs::find(const Vertices& surface, const ClothingTerms& terms,
+                                               const Eigen::VectorXd& tightness) const {
+  const Vertices normals = vertexNormals(model_.topology()->faces(), surface);
+  const RobustLoss inside{RobustLoss::Kind::kGemanMcClure, terms.loss_scale};
   const RobustLoss outside{RobustLoss::Kind::kGemanMcClure, options_.outside_scale};
   std::vector<SurfaceTarget> targets;
-  for (const std::int32_t v : chosen_) {
+  for (std::size_t i = 0; i < chosen_.size(); ++i) {
+    const auto v = chosen_[i];
     const auto pair = pairOf(surface, normals, v);
     if (!pair) continue;
     const double square = pair->height * pair->height;
-    const double weight = pair->height > 0 ? (weights.data + weights.cloth) * outside.weight(square)
-                                           : weights.data * inside.weight(square);
+    const double tight = tightness.size() > 0 ? tightness[Eigen::Index(i)] : 1;
+    const double weight = pair->height > 0 ? (terms.weights.data + terms.weights.cloth) * outside.weight(square)
+                                           : terms.weights.data * tight * inside.weight(square);
     targets.push_back(
         {{v, v, v}, Eigen::Vector3d::UnitX(), pair->position.transpose(), pair->normal.transpose(), weight});
   }
   const auto pulls =
-      landmarkTargets(landmarks_, model_.topology()->faces(), weights.landmarks * double(targets.size()));
+      landmarkTargets(landmarks_, model_.topology()->faces(), terms.weights.landmarks * double(targets.size()));
   targets.insert(targets.end(), pulls.begin(), pulls.end());
   return targets;
 }
 
+double ClothingPairs::misfit(const Vertices& surface) const {
+  const Eigen::VectorXd below = gaps(surface);
+  double body = 0, scan = 0;
+  for (const double gap : below)
+    body += std::isnan(gap) ? 1 : bounded(gap, gap >= 0 ? options_.outside_scale : options_.outside_scale / 3);
+  Vertices points(Eigen::Index(chosen_.size()), 3);
+  for (std::size_t i = 0; i < chosen_.size(); ++i) points.row(Eigen::Index(i)) = surface.row(chosen_[i]);
+  const PointTree tree(points);
+  const auto samples = everyFew(scan_.points(), scan_.normals(), kScanPoints);
+  for (const auto& point : samples.points.rowwise())
+    scan += bounded(std::sqrt(tree.nearest(point).squared_distance), options_.thickest);
+  return body / double(below.size()) + scan / double(samples.points.rows());
+}
+
 void ClothingPairs::measure(const Vertices& surface, ClothedFrame& frame) const {
   const Vertices normals = vertexNormals(model_.topology()->faces(), surface);
-  double pairs = 0, inside = 0, gap = 0;
+  const double tolerance = 2 * options_.scan_noise;
+  double pairs = 0, inside = 0, strictly = 0, gap = 0, explained = 0;
   for (std::int32_t v = 0; v < surface.rows(); ++v)
     if (const auto pair = pairOf(surface, normals, v)) {
       pairs += 1;
-      inside += pair->height <= 0;
+      inside += pair->height <= tolerance;
+      strictly += pair->height <= 0;
       gap -= pair->height;
     }
+  frame.seen = pairs / double(surface.rows());
   frame.inside = pairs > 0 ? inside / pairs : 0;
+  frame.inside_strictly = pairs > 0 ? strictly / pairs : 0;
   frame.mean_gap = pairs > 0 ? gap / pairs : 0;
+  const ClosestPointQuery closest(surface, model_.topology()->faces());
+  for (const auto& point : scan_.points().rowwise()) explained += closest(point).distance <= options_.thickest;
+  frame.explained = explained / double(scan_.points().rows());
 }
 
 }  // namespace shaped

@@ -3,11 +3,9 @@
 #include <algorithm>
 #include <cmath>
 #include <deque>
-#include <numeric>
-#include <set>
 
-#include "core/clothing/clothing_pairs.h"
-#include "core/mesh/quality.h"
+#include "core/clothing/clothed_sequence.h"
+#include "core/clothing/first_fits.h"
 #include "core/numerics/error.h"
 #include "core/numerics/option_checks.h"
 #include "core/registration/scan_checks.h"
@@ -15,105 +13,26 @@
 namespace shaped {
 namespace {
 
-/// The frames prepared, and what is known of the person so far.
-class Sequence {
- public:
-  Sequence(std::span<const Scan> scans, const BodyModel& model, std::span<const std::vector<Landmark>> landmarks,
-           const ClothingOptions& options)
-      : model_(model), options_(options) {
-    static const std::vector<Landmark> none;
-    for (std::size_t f = 0; f < scans.size(); ++f)
-      frames_.emplace_back(scans[f], model, landmarks.empty() ? none : landmarks[f], options);
+void requireLandmarks(const std::vector<Landmark>& landmarks, std::size_t frame, const Topology& topology) {
+  for (std::size_t i = 0; i < landmarks.size(); ++i) {
+    const std::string where = "landmarks[" + std::to_string(frame) + "][" + std::to_string(i) + "]";
+    const auto face = landmarks[i].anchor.face;
+    if (face < 0 || face >= topology.faces().rows())
+      throw InvalidInput(where, "is on face " + std::to_string(face) + ", and the model has " +
+                                    std::to_string(topology.faces().rows()));
+    if (!landmarks[i].position.allFinite() || !(landmarks[i].weight >= 0)) throw InvalidInput(where, "is not finite");
   }
+}
 
-  /// The posture of one frame, the identity held.
-  Solved<BodySequence> settleFrame(const BodyState& start, std::size_t frame, const ClothingWeights& weights) const {
-    return settled({start.identity, {start.pose}}, {frame}, weights, false, true);
-  }
-
-  /// The identity by some frames, with their postures or with those held.
-  Outcome settle(BodySequence& state, const std::vector<std::size_t>& frames, const ClothingWeights& weights,
-                 bool postures) const {
-    BodySequence some{state.identity, {}};
-    for (const auto f : frames) some.poses.push_back(state.poses[f]);
-    const auto result = settled(std::move(some), frames, weights, true, postures);
-    state.identity = result.solution.identity;
-    for (std::size_t i = 0; i < frames.size(); ++i) state.poses[frames[i]] = result.solution.poses[i];
-    return result;
-  }
-
-  std::size_t size() const { return frames_.size(); }
-
-  ClothedFrame measured(const BodyState& state, std::size_t frame, const Outcome& outcome) const {
-    ClothedFrame result{state.pose, outcome, 0, 0, 0, false};
-    frames_[frame].measure(model_.posed(state).vertices(), result);
-    return result;
-  }
-
- private:
-  /// Closest points and steps in turn, until the surfaces stand still. One pose in `state` for each of `frames`.
-  Solved<BodySequence> settled(BodySequence state, const std::vector<std::size_t>& frames,
-                               const ClothingWeights& weights, bool identity, bool pose) const {
-    Solved<BodySequence> result(std::move(state), {Termination::kIterationLimit, 0, 0});
-    auto surfaces = surfacesOf(result.solution);
-    for (int round = 0; round < options_.rounds; ++round) {
-      std::vector<std::vector<SurfaceTarget>> targets;
-      for (std::size_t i = 0; i < frames.size(); ++i) targets.push_back(frames_[frames[i]].find(surfaces[i], weights));
-      const auto step = fitBodies(model_, result.solution, targets, fitOptions(targets, identity, pose));
-      result.iterations += step.iterations;
-      if (step.termination == Termination::kCancelled || step.termination == Termination::kNumericalFailure) {
-        result.termination = step.termination;
-        return result;
-      }
-      result.solution = step.solution;
-      const auto moved = surfacesOf(result.solution);
-      result.residual = 0;
-      for (std::size_t i = 0; i < moved.size(); ++i)
-        result.residual = std::max(result.residual, rmsVertexDistance(moved[i], surfaces[i]));
-      surfaces = moved;
-      if (result.residual <= options_.tolerance) {
-        result.termination = Termination::kConverged;
-        return result;
-      }
-    }
-    return result;
-  }
-
-  std::vector<Vertices> surfacesOf(const BodySequence& state) const {
-    std::vector<Vertices> surfaces;
-    for (const auto& pose : state.poses) surfaces.push_back(model_.posed({state.identity, pose}).vertices());
-    return surfaces;
-  }
-
-  BodyFitOptions fitOptions(const std::vector<std::vector<SurfaceTarget>>& targets, bool identity, bool pose) const {
-    BodyFitOptions fit;
-    // Weights are absolute here: what the cloth's term adds must not take from the data's.
-    double weights = 0, count = 0;
-    for (const auto& frame : targets)
-      for (const auto& target : frame) weights += target.weight, count += 1;
-    if (weights > 0) fit.observations *= weights / count;
-    fit.sigma = 0.01;
-    fit.pose_deviation = 0.5;
-    fit.identity = identity;
-    fit.pose = fit.placement = pose;
-    fit.max_iterations = 3;
-    fit.tolerance = 1e-7;  // a step not worth taking would pass for a surface at rest
-    fit.stop = options_.stop;
-    return fit;
-  }
-
-  const BodyModel& model_;
-  const ClothingOptions& options_;
-  std::deque<ClothingPairs> frames_;
-};
-
-void requireInput(std::span<const Scan> scans, std::span<const std::vector<Landmark>> landmarks) {
+void requireInput(std::span<const Scan> scans, std::span<const std::vector<Landmark>> landmarks,
+                  const Topology& topology) {
   if (scans.empty()) throw InvalidInput("scans", "is empty, want at least one frame");
   if (!landmarks.empty() && landmarks.size() != scans.size())
     throw InvalidInput("landmarks", "has " + std::to_string(landmarks.size()) +
                                         " lists, want none or one for each of " + std::to_string(scans.size()) +
                                         " frames");
   for (std::size_t f = 0; f < scans.size(); ++f) requireUsableScan(scans[f], "scans[" + std::to_string(f) + "]");
+  for (std::size_t f = 0; f < landmarks.size(); ++f) requireLandmarks(landmarks[f], f, topology);
 }
 
 /// Tells how far the sequence is.
@@ -121,144 +40,136 @@ void tell(const ClothingOptions& options, const std::string& stage, double fract
   if (options.progress) options.progress({stage, fraction, 0});
 }
 
-/// A frame registered as if it were naked: not who is in it, but how they stand.
-struct FirstFit {
-  BodyState state;
-  double score = -1;
-};
-
-/// First fits of all frames. A pose far from rest is often missed by itself (legs that cross are taken for each other),
-/// so frames that fit badly are tried again from the poses of those that fit well, the nearest in time first.
-class FirstFits {
+/// Who is in the scans and how they stand, pass by pass.
+class Estimation {
  public:
-  FirstFits(std::span<const Scan> scans, const BodyModel& model, std::span<const std::vector<Landmark>> landmarks,
-            const ClothingOptions& options)
-      : scans_(scans), model_(model), landmarks_(landmarks), options_(options), fits_(scans.size()) {
-    registration_ = options.registration;
-    registration_.stop = options.stop;
-  }
+  Estimation(const std::deque<ScanSurface>& scans, const BodyModel& model,
+             std::span<const std::vector<Landmark>> landmarks, const ClothingOptions& options)
+      : model_(model), options_(options), sequence_(scans, model, landmarks, options), outcomes_(scans.size()) {}
 
-  const std::vector<FirstFit>& run() {
-    const std::size_t alone = std::min(scans_.size(), std::size_t(options_.fitted_alone));
-    for (std::size_t i = 0; i < alone && !stopped(); ++i) {
-      const std::size_t frame = i * scans_.size() / alone;
-      tell(options_, "first fit " + std::to_string(frame + 1), 0.2 * double(i) / double(alone));
-      keep(frame, registerScan(scans_[frame], model_, landmarksOf(frame), registration_).solution);
+  Solved<ClothedBody> run(const std::vector<FirstFit>& fits, std::size_t best) {
+    state_.identity = Eigen::VectorXd::Zero(model_.modeCount());
+    state_.identity.head(fits[best].state.identity.size()) = fits[best].state.identity;
+    for (const auto& fit : fits) state_.poses.push_back(fit.state.pose);
+    for (std::size_t f = 0; f < fits.size(); ++f)
+      if (fits[f].score >= options_.good_share * fits[best].score) trusted_.push_back(f);
+    Solved<ClothedBody> result;
+    settlePostures(termsOf(0), {});
+    for (int pass = 0; pass < options_.passes; ++pass) {
+      const Eigen::VectorXd tightness = sequence_.tightness(state_, trusted_);
+      static_cast<Outcome&>(result) = sequence_.settleIdentity(state_, trusted_, termsOf(pass), tightness);
+      ClothingTerms postures = termsOf(pass);
+      postures.loss_scale = options_.posture_loss_scale;
+      if (pass == std::min(1, options_.passes - 1)) reseat(postures, tightness);
+      settlePostures(postures, tightness);
+      if (pass > 0)
+        tell(options_, "pass " + std::to_string(pass + 1), 0.7 + 0.3 * double(pass + 1) / double(options_.passes));
+      if (options_.stop.stop_requested()) result.termination = Termination::kCancelled;
+      if (result.termination == Termination::kCancelled) break;
     }
-    for (std::size_t round = 0; round < scans_.size() && !stopped(); ++round) {
-      const auto frame = worstNeighbour();
-      if (!frame) break;
-      tell(options_, "first fit " + std::to_string(*frame + 1), 0.2 + 0.2 * double(round) / double(scans_.size()));
-      retry(*frame);
-      tried_.insert(*frame);
-    }
-    return fits_;
-  }
-
-  std::size_t best() const {
-    return std::size_t(std::max_element(fits_.begin(), fits_.end(), lessScore) - fits_.begin());
+    result.solution.identity = state_.identity;
+    result.solution.frames = measured();
+    return result;
   }
 
  private:
-  static bool lessScore(const FirstFit& one, const FirstFit& other) { return one.score < other.score; }
-  bool stopped() const { return options_.stop.stop_requested(); }
-  bool good(std::size_t frame) const { return fits_[frame].score >= options_.good_share * fits_[best()].score; }
-
-  std::vector<Landmark> landmarksOf(std::size_t frame) const {
-    return landmarks_.empty() ? std::vector<Landmark>() : landmarks_[frame];
+  ClothingTerms termsOf(int pass) const {
+    const double share = options_.passes > 1 ? double(pass) / double(options_.passes - 1) : 1;
+    const auto between = [&](double first, double last) {
+      return first > 0 && last > 0 ? first * std::pow(last / first, share) : first + share * (last - first);
+    };
+    const auto &first = options_.first, &last = options_.last;
+    return {
+        {between(first.landmarks, last.landmarks), between(first.data, last.data), between(first.cloth, last.cloth)},
+        between(options_.first_loss_scale, options_.last_loss_scale)};
   }
 
-  void keep(std::size_t frame, const ScanRegistration& fit) {
-    if (fit.score > fits_[frame].score) fits_[frame] = {fit.state, fit.score};
+  void settlePostures(const ClothingTerms& terms, const Eigen::VectorXd& tightness) {
+    for (std::size_t f = 0; f < sequence_.size() && !options_.stop.stop_requested(); ++f)
+      outcomes_[f] = sequence_.settlePosture(state_, f, terms, tightness);
   }
 
-  /// Good frames, the nearest in time first.
-  std::vector<std::size_t> goodFramesNear(std::size_t frame) const {
-    std::vector<std::size_t> frames;
-    for (std::size_t f = 0; f < fits_.size(); ++f)
-      if (f != frame && good(f)) frames.push_back(f);
+  /// Limbs in other ways, and as they stand in frames nearby; then who is trusted is decided anew.
+  void reseat(const ClothingTerms& terms, const Eigen::VectorXd& tightness) {
+    for (std::size_t f = 0; f < sequence_.size() && !options_.stop.stop_requested(); ++f) {
+      tell(options_, "limbs of frame " + std::to_string(f + 1), 0.6 + 0.1 * double(f) / double(sequence_.size()));
+      sequence_.reseatLimbs(state_, f, nearest(f), terms, tightness);
+      const bool missed = std::find(trusted_.begin(), trusted_.end(), f) == trusted_.end();
+      if (missed) sequence_.searchLimbs(state_, f, terms, tightness);
+    }
+    const auto frames = measured();
+    trusted_.clear();
+    for (std::size_t f = 0; f < frames.size(); ++f)
+      if (frames[f].trusted) trusted_.push_back(f);
+  }
+
+  /// The trusted frames nearest in time.
+  std::vector<std::size_t> nearest(std::size_t frame) const {
+    std::vector<std::size_t> frames = trusted_;
+    std::erase(frames, frame);
     const auto away = [&](std::size_t f) { return f > frame ? f - frame : frame - f; };
     std::stable_sort(frames.begin(), frames.end(), [&](std::size_t a, std::size_t b) { return away(a) < away(b); });
+    frames.resize(std::min(frames.size(), std::size_t(options_.retries)));
     return frames;
   }
 
-  /// The bad frame not yet tried again that stands nearest to a good one.
-  std::optional<std::size_t> worstNeighbour() const {
-    std::optional<std::size_t> chosen;
-    std::size_t least = scans_.size();
-    for (std::size_t f = 0; f < scans_.size(); ++f) {
-      if (good(f) || tried_.count(f)) continue;
-      const std::size_t nearest = goodFramesNear(f).front();
-      const std::size_t away = nearest > f ? nearest - f : f - nearest;
-      if (away < least) least = away, chosen = f;
+  std::vector<ClothedFrame> measured() const {
+    std::vector<ClothedFrame> frames;
+    double most = 0;
+    for (std::size_t f = 0; f < sequence_.size(); ++f) {
+      frames.push_back(sequence_.measured(state_, f, outcomes_[f]));
+      most = std::max(most, frames.back().explained);
     }
-    return chosen;
+    for (auto& frame : frames) frame.trusted = frame.explained >= options_.explained_share * most;
+    return frames;
   }
 
-  void retry(std::size_t frame) {
-    const auto near = goodFramesNear(frame);
-    const ScanSurface surface(scans_[frame]);
-    for (std::size_t i = 0; i < near.size() && i < std::size_t(options_.retries) && !good(frame) && !stopped(); ++i) {
-      const BodyState& known = fits_[near[i]].state;
-      const auto start = startRigidly(surface, model_.posed(known).vertices(), model_.topology()->faces(),
-                                      registration_.start, options_.stop)
-                             .solution;
-      for (const auto& motion : {start.motion, start.runner_up})
-        if (!good(frame))
-          keep(frame, registerScanFrom(scans_[frame], model_, carried(model_, known, motion), landmarksOf(frame),
-                                       registration_)
-                          .solution);
-    }
-  }
-
-  std::span<const Scan> scans_;
   const BodyModel& model_;
-  std::span<const std::vector<Landmark>> landmarks_;
   const ClothingOptions& options_;
-  ScanRegistrationOptions registration_;
-  std::vector<FirstFit> fits_;
-  std::set<std::size_t> tried_;
+  ClothedSequence sequence_;
+  BodySequence state_;
+  std::vector<std::size_t> trusted_;  ///< frames that speak of the identity: a missed limb must not
+  std::vector<Outcome> outcomes_;
 };
-
-/// The frames that fit well, best first: a missed posture must not speak of the identity.
-std::vector<std::size_t> goodFrames(const std::vector<FirstFit>& fits, std::span<const std::vector<Landmark>> landmarks,
-                                    double good_share) {
-  std::vector<std::size_t> order(fits.size());
-  std::iota(order.begin(), order.end(), std::size_t(0));
-  std::stable_sort(order.begin(), order.end(),
-                   [&](std::size_t a, std::size_t b) { return fits[a].score > fits[b].score; });
-  std::erase_if(order, [&, best = fits[order[0]].score](std::size_t f) {
-    const bool shown = !landmarks.empty() && landmarks[f].size() >= 3;  // the posture is known
-    return !shown && fits[f].score < good_share * best;
-  });
-  return order;
-}
 
 }  // namespace
 
 ScanRegistrationOptions clothedRegistration() {
   ScanRegistrationOptions options;
   options.fit.pose_deviation = 1;
+  options.fit.levels.erase(options.fit.levels.begin());  // limbs are searched for, and cloth has no finest level
+  options.fit.levels.pop_back();
   return options;
 }
 
 std::optional<std::string> ClothingOptions::firstViolation() const {
   if (fitted_alone < 1) return "fitted_alone = " + std::to_string(fitted_alone) + ", want >= 1";
-  if (first_frames < 1) return "first_frames = " + std::to_string(first_frames) + ", want >= 1";
+  if (retries < 1) return "retries = " + std::to_string(retries) + ", want >= 1";
   if (points < 50) return "points = " + std::to_string(points) + ", want >= 50";
   if (rounds < 1) return "rounds = " + std::to_string(rounds) + ", want >= 1";
+  if (first_modes < 1) return "first_modes = " + std::to_string(first_modes) + ", want >= 1";
   if (passes < 1) return "passes = " + std::to_string(passes) + ", want >= 1";
-  for (const auto& [name, weights] : {std::pair{"first", first}, {"postures", postures}, {"refined", refined}})
+  for (const auto& [name, weights] : {std::pair{"first", first}, {"last", last}})
     for (const double weight : {weights.landmarks, weights.data, weights.cloth})
       if (!(weight >= 0) || !std::isfinite(weight)) return std::string(name) + " holds a weight below 0";
-  if (auto problem = unlessPositive("loss_scale", loss_scale)) return problem;
-  if (auto problem = unlessPositive("outside_scale", outside_scale)) return problem;
-  if (auto problem = unlessPositive("max_distance", max_distance)) return problem;
-  if (auto problem = unlessPositive("tolerance", tolerance)) return problem;
+  for (const auto& [name, value] : {std::pair{"first_loss_scale", first_loss_scale},
+                                    {"last_loss_scale", last_loss_scale},
+                                    {"posture_loss_scale", posture_loss_scale},
+                                    {"outside_scale", outside_scale},
+                                    {"tight_spread", tight_spread},
+                                    {"sigma", sigma},
+                                    {"observations", observations},
+                                    {"max_distance", max_distance},
+                                    {"thickest", thickest},
+                                    {"tolerance", tolerance}})
+    if (auto problem = unlessPositive(name, value)) return problem;
+  if (!(scan_noise >= 0) || !std::isfinite(scan_noise))
+    return "scan_noise = " + std::to_string(scan_noise) + ", want >= 0";
   if (!(max_normal_angle > 0 && max_normal_angle <= 180))
     return "max_normal_angle = " + std::to_string(max_normal_angle) + ", want (0, 180]";
-  if (!(good_share >= 0 && good_share <= 1)) return "good_share = " + std::to_string(good_share) + ", want 0 to 1";
-  if (retries < 1) return "retries = " + std::to_string(retries) + ", want >= 1";
+  for (const auto& [name, share] : {std::pair{"good_share", good_share}, {"explained_share", explained_share}})
+    if (!(share >= 0 && share <= 1)) return std::string(name) + " = " + std::to_string(share) + ", want 0 to 1";
+  if (auto problem = limbs.firstViolation()) return "limbs." + *problem;
   return registration.firstViolation();
 }
 
@@ -266,40 +177,18 @@ Solved<ClothedBody> estimateUnderClothing(std::span<const Scan> scans, const Bod
                                           std::span<const std::vector<Landmark>> landmarks,
                                           const ClothingOptions& options) {
   if (const auto problem = options.firstViolation()) throw InvalidInput("options", *problem);
-  requireInput(scans, landmarks);
-  const Sequence sequence(scans, model, landmarks, options);
-  FirstFits first_fits(scans, model, landmarks, options);
+  requireInput(scans, landmarks, *model.topology());
+  std::deque<ScanSurface> surfaces;
+  for (const auto& scan : scans) surfaces.emplace_back(pointsInwards(scan) ? flipped(scan) : scan);
+  const BodyModel coarse = model.truncated(std::min<Eigen::Index>(options.first_modes, model.modeCount()));
+  FirstFits first_fits(surfaces, coarse, landmarks, options);
   const auto& fits = first_fits.run();
-  Solved<ClothedBody> result;
   if (options.stop.stop_requested()) {
-    result.termination = Termination::kCancelled;
-    return result;
+    Solved<ClothedBody> nothing;
+    nothing.termination = Termination::kCancelled;
+    return nothing;
   }
-  BodySequence state{fits[first_fits.best()].state.identity, {}};
-  for (const auto& fit : fits) state.poses.push_back(fit.state.pose);
-  const auto trusted = goodFrames(fits, landmarks, options.good_share);
-  const std::size_t together = std::min(trusted.size(), std::size_t(options.first_frames));
-  sequence.settle(state, {trusted.begin(), trusted.begin() + std::ptrdiff_t(together)}, options.first, true);
-  std::vector<Outcome> outcomes(sequence.size());
-  for (int pass = 0; pass < options.passes; ++pass) {
-    for (std::size_t f = 0; f < sequence.size(); ++f) {
-      tell(options, "posture " + std::to_string(f + 1),
-           0.4 + 0.6 * (pass + double(f + 1) / double(sequence.size())) / options.passes);
-      const auto posture = sequence.settleFrame({state.identity, state.poses[f]}, f, options.postures);
-      outcomes[f] = posture;
-      state.poses[f] = posture.solution.poses[0];
-    }
-    static_cast<Outcome&>(result) = sequence.settle(state, trusted, options.refined, false);
-  }
-  result.solution.identity = state.identity;
-  for (std::size_t f = 0; f < sequence.size(); ++f)
-    result.solution.frames.push_back(sequence.measured({state.identity, state.poses[f]}, f, outcomes[f]));
-  for (std::size_t f = 0; f < sequence.size(); ++f) {
-    auto& frame = result.solution.frames[f];
-    frame.score = fits[f].score;
-    frame.trusted = std::find(trusted.begin(), trusted.end(), f) != trusted.end();
-  }
-  return result;
+  return Estimation(surfaces, model, landmarks, options).run(fits, first_fits.best());
 }
 
 }  // namespace shaped

@@ -50,21 +50,6 @@ BodyState startState(const ScanSurface& surface, const BodyModel& model, const s
   return result.took_runner_up ? other.state : best.state;
 }
 
-/// Share of the scan's points near the surface and facing its way.
-double scoreOf(const ScanSurface& scan, const BodyModel& model, const Vertices& surface) {
-  const auto& faces = model.topology()->faces();
-  const double near = 0.01 * boundingBoxDiagonal(model.parts().mean);
-  const ClosestPointQuery closest(surface, faces);
-  const Vertices normals = faceNormals(faces, surface);
-  Eigen::Index good = 0;
-  for (Eigen::Index i = 0; i < scan.points().rows(); ++i) {
-    const SurfacePoint found = closest(scan.points().row(i));
-    const double cosine = normals.row(found.face).dot(scan.normals().row(i));
-    good += found.distance <= near && (scan.hasOrientedNormals() ? cosine : std::abs(cosine)) >= 0.5;
-  }
-  return double(good) / double(scan.points().rows());
-}
-
 void addWarnings(const ScanRegistrationOptions& options, const Outcome& outcome, ScanRegistration& result) {
   auto& warnings = result.warnings;
   if (result.score < options.least_score)
@@ -124,7 +109,7 @@ Result registered(const ScanSurface& surface, const BodyModel& model, const Body
   const bool usable = fit.converged() || fit.termination == Termination::kIterationLimit;
   if (options.field && usable) deformByField(surface, model, options, result.solution);
   if (options.refine && usable) refine(surface, model, landmarks, options, result);
-  result.solution.score = scoreOf(surface, model, result.solution.vertices);
+  result.solution.score = registrationScore(surface, model, result.solution.vertices);
   addWarnings(options, result, result.solution);
   return result;
 }
@@ -174,6 +159,20 @@ Scan preparedScan(const Scan& scan, double unit_factor) {
   Scan ready = pointsInwards(scan) ? flipped(scan) : scan;
   ready.points *= unit_factor;
   return ready;
+}
+
+double registrationScore(const ScanSurface& scan, const BodyModel& model, const Vertices& surface) {
+  const auto& faces = model.topology()->faces();
+  const double near = 0.01 * boundingBoxDiagonal(model.parts().mean);
+  const ClosestPointQuery closest(surface, faces);
+  const Vertices normals = faceNormals(faces, surface);
+  Eigen::Index good = 0;
+  for (Eigen::Index i = 0; i < scan.points().rows(); ++i) {
+    const SurfacePoint found = closest(scan.points().row(i));
+    const double cosine = normals.row(found.face).dot(scan.normals().row(i));
+    good += found.distance <= near && (scan.hasOrientedNormals() ? cosine : std::abs(cosine)) >= 0.5;
+  }
+  return double(good) / double(scan.points().rows());
 }
 
 bool pointsInwards(const Scan& scan) {

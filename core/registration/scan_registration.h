@@ -69,6 +69,9 @@ Solved<ScanRegistration> registerScanFrom(const Scan& scan, const BodyModel& mod
 /// (requireUsableScan).
 Scan preparedScan(const Scan& scan, double unit_factor);
 
+/// ScanRegistration::score of a surface (V x 3, of the model).
+double registrationScore(const ScanSurface& scan, const BodyModel& model, const Vertices& surface);
+
 /// Whether the normals of a scan point inwards on the whole: the mean of n . (x - centre), which for a closed surface
 /// is three times its volume, is negative. False without normals.
 bool pointsInwards(const Scan& scan);

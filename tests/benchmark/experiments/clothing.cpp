@@ -1,6 +1,7 @@
 #include "core/clothing/under_clothing.h"
 
 #include <cstdlib>
+#include <filesystem>
 #include <nlohmann/json.hpp>
 
 #include "core/io/file.h"
@@ -51,15 +52,11 @@ void clothing() {
   for (const std::size_t i : data.others) training.push_back(data.rest[i]);
   BodyTrainingOptions options;
   options.posture = PostureNormalisation::kNone;
-  options.modes = 20;
+  options.modes = 40;
   const BodyModel model = trainBody(data.reference, training, options)->model;
   const auto clothed = clothedData();
   const Stopwatch watch;
-  ClothingOptions clothing_options;
-  if (const char* tune = std::getenv("TUNE"))
-    std::sscanf(tune, "%lf,%lf,%lf", &clothing_options.refined.cloth, &clothing_options.postures.cloth,
-                &clothing_options.loss_scale);
-  const auto result = estimateUnderClothing(clothed.scans, model, {}, clothing_options);
+  const auto result = estimateUnderClothing(clothed.scans, model, {});
   const double seconds = watch.cpu();
   for (std::size_t f = 0; f < clothed.scans.size(); ++f) {
     const auto& frame = result.solution.frames[f];
@@ -69,8 +66,12 @@ void clothing() {
                  text("%.1f mm; %.1f mm", 1000 * error, 1000 * clothed.thickness[f]), "v2v < half the cloth",
                  error < 0.5 * clothed.thickness[f]);
     report.entry(
-        text("frame %zu (%s, score %.3f): inside; mean gap", f, frame.trusted ? "trusted" : "doubtful", frame.score),
-        text("%.1f %%; %.1f mm", 100 * frame.inside, 1000 * frame.mean_gap), "98 % inside", frame.inside >= 0.98);
+        text("frame %zu (%s): inside or within 3 mm; strictly; mean gap", f, frame.trusted ? "trusted" : "doubtful"),
+        text("%.1f %%; %.1f %%; %.1f mm", 100 * frame.inside, 100 * frame.inside_strictly, 1000 * frame.mean_gap),
+        "98 % inside", frame.inside >= 0.98);
+    if (const char* folder = std::getenv("CLOTHING_MESHES"))
+      writeMesh(std::filesystem::path(folder) / text("body_%zu.ply", f),
+                model.posed({result.solution.identity, frame.pose}).vertices(), model.topology()->faces());
   }
   const Vertices rest = model.rest(result.solution.identity);
   report.entry("identity at rest: v2v",
