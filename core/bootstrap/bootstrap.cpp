@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <cmath>
 #include <mutex>
+#include <set>
 
 #include "core/bootstrap/acceptance.h"
 #include "core/bootstrap/field_examples.h"
@@ -240,7 +241,10 @@ class Bootstrap {
     BootstrapRound round;
     round.round = roundNumber();
     round.registrations = registrations_.size();
-    for (std::size_t i = 0; i < examples_.count(); ++i) round.examples += taught(i);
+    std::set<std::size_t> examples;
+    for (std::size_t i = 0; i < examples_.count(); ++i)
+      if (taught(i)) examples.insert(examples_.example(i));
+    round.examples = examples.size();
     for (const auto& fitted : state_.scans) round.scans.push_back(fitted.report);
     judge(options_.acceptance, round);
     std::vector<const FittedScan*> joining;

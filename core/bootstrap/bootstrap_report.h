@@ -56,7 +56,7 @@ struct BootstrapRound {
   std::size_t registrations = 0;     ///< that the round's model was learned from
   double smallest = 0, largest = 0;  ///< chamfer distance of the registrations that were compared, m; 0 with none
   double accepted_below = 0;         ///< smallest + acceptance * standard deviation, m
-  std::size_t examples = 0;          ///< that its field was trained on; the others' fits failed or were doubtful
+  std::size_t examples = 0;          ///< that taught its field; all fits of the others failed or were doubtful
   std::size_t joined = 0;
   std::vector<BootstrapScan> scans;  ///< that were tried, ascending
 };

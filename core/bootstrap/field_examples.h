@@ -15,6 +15,8 @@ class FieldExamples {
 
   /// Scans of all registrations.
   std::size_t count() const { return scans_.size(); }
+  /// The registration that scan i is of.
+  std::size_t example(std::size_t i) const { return scans_[i].example; }
 
   /// Fits a model to scan i. Nothing once the stop token has fired; a state without numbers where the fit failed or
   /// scores below what is trusted.

@@ -308,6 +308,8 @@ class Interrupted(unittest.TestCase):
         while job["state"] == "running" and time.monotonic() - begin < 20:
             job = self.job(id)
         self.assertEqual(job["state"], "cancelled")
+        while list(self.store.glob("jobs/*")) and time.monotonic() - begin < 20:
+            time.sleep(0.1)  # the folder goes after the record is written
         self.assertEqual(list(self.store.glob("jobs/*")), [])
         self.assertEqual(trainers_of(self.daemon.process.pid), [])
 
