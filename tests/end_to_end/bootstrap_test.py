@@ -222,8 +222,11 @@ class Grown(DaemonCase):
         self.assertEqual(job["end"], "few_joined")  # 3 scans at most, and ten are wanted for another round
 
     def test_a_job_leaves_nothing_but_its_result(self):
-        files = [path.name for path in (self.folder / "store/jobs" ).glob("*/*")]
-        self.assertEqual(set(files), {"result"})
+        kept = lambda: {path.name for path in (self.folder / "store/jobs").glob("*/*")}
+        begin = time.monotonic()
+        while kept() != {"result"} and time.monotonic() - begin < 20:
+            time.sleep(0.1)  # the rest goes after the record is written
+        self.assertEqual(kept(), {"result"})
         self.assertEqual(trainers_of(self.daemon.process.pid), [])
 
 
