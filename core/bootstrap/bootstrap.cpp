@@ -133,9 +133,7 @@ class Bootstrap {
   JacobianFieldWeights judged(const FieldTrainingSet& set, JacobianFieldWeights field,
                               const std::vector<RestPair>& judges) const {
     const auto judgement = judgeField(set, field, judges);
-    const auto millimetres = [](double metres) {
-      return std::to_string(std::lround(1e5 * metres) / 100.0).substr(0, 5);
-    };
+    const auto millimetres = [](double metres) { return std::to_string(std::round(1e5 * metres) / 100).substr(0, 5); };
     tell(std::string(judgement.helps() ? "the field helps" : "the field does not help and is silenced") + ": of " +
              std::to_string(judges.size()) + " scans held out it leaves " + millimetres(judgement.after) +
              " mm where there were " + millimetres(judgement.before) + " mm",

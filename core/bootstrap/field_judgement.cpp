@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <iterator>
+#include <limits>
 #include <set>
 
 #include "core/mesh/quality.h"
@@ -37,8 +38,12 @@ FieldJudgement judgeField(const FieldTrainingSet& set, const JacobianFieldWeight
   tbb::parallel_for(std::size_t{0}, judges.size(), [&](std::size_t i) {
     const auto& pair = judges[i];
     const auto features = jacobianFieldFeatures(*set.reference, pair.source, pair.scan, set.scaling);
-    each[i] = {meanVertexDistance(pair.source, pair.target),
-               meanVertexDistance(deformation.deform(*set.reference->poisson, features), pair.target)};
+    const auto jacobians = deformation.predict(features);
+    each[i].before = meanVertexDistance(pair.source, pair.target);
+    each[i].after = std::numeric_limits<double>::infinity();
+    if (!jacobians.allFinite()) return;
+    const Vertices deformed = set.reference->poisson->solve(jacobians, features.centroids);
+    each[i].after = meanVertexDistance(deformed, pair.target);
   });
   FieldJudgement mean;
   for (const auto& one : each) {

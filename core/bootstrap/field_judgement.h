@@ -17,7 +17,8 @@ struct FieldJudgement {
   bool helps() const { return after < before; }
 };
 
-/// judges: at least one pair. Throws as jacobianFieldFeatures does.
+/// judges: at least one pair. `after` is infinite where the field overflows on one. Throws as jacobianFieldFeatures
+/// does.
 FieldJudgement judgeField(const FieldTrainingSet& set, const JacobianFieldWeights& field,
                           const std::vector<RestPair>& judges);
 
