@@ -43,6 +43,8 @@ void bodyModels();
 void registration();
 /// Row "bliss"; only where LibTorch is there to train fields.
 void bliss();
+/// Row "faces"; likewise.
+void blissFaces();
 /// Row "clothing".
 void clothing();
 /// Row "robustness".

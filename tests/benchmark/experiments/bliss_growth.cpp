@@ -1,0 +1,167 @@
+#include "tests/benchmark/experiments/bliss_growth.h"
+
+#include <tbb/parallel_for.h>
+
+#include <algorithm>
+#include <cstdlib>
+#include <utility>
+
+#include "core/mesh/alignment.h"
+#include "core/mesh/quality.h"
+#include "core/registration/field_deformation.h"
+#include "core/training/field_training.h"
+#include "tests/benchmark/experiments/timing.h"
+
+namespace shaped::experiments {
+namespace {
+
+/// The learner of fields: the paper's networks, as long as SHAPED_EPOCHS says; with 0 the field stays as it begins, and
+/// the regression is seen alone.
+FieldTrainer trainerOf(int epochs) {
+  return [epochs](const FieldTrainingSet& set, const std::stop_token& stop) -> std::optional<JacobianFieldWeights> {
+    FieldArchitecture architecture;
+    architecture.offsets = true;
+    auto untrained = untrainedField(set.scaling, architecture, 1);
+    if (epochs == 0) return untrained;
+    std::vector<FieldPair> pairs;
+    for (const auto& pair : set.pairs)
+      pairs.push_back(makeFieldPair(set.reference, pair.source, pair.target, pair.scan, set.scaling));
+    FieldTrainingOptions options;
+    options.epochs = epochs;
+    options.stop = stop;
+    const Stopwatch watch;
+    options.each_epoch = [&](const FieldEpoch& epoch, const FieldTrainingState&) {
+      std::printf("  field: epoch %d, vertex %.3g m^2, jacobian %.3g, %.0f s\n", epoch.epoch, epoch.loss.vertex,
+                  epoch.loss.jacobian, watch.wall());
+      std::fflush(stdout);
+    };
+    auto trained = trainJacobianField(pairs, untrainedState(std::move(untrained)), options);
+    if (trained.termination == Termination::kCancelled) return std::nullopt;
+    return std::move(trained.solution.weights);
+  };
+}
+
+/// What a bootstrap had learned at some time.
+struct Snapshot {
+  std::vector<Vertices> joined;
+  JacobianFieldWeights field;
+};
+
+std::vector<Snapshot> snapshotsOf(const BootstrapInputs& inputs, const BootstrapOptions& options, int epochs,
+                                  bool first_only, std::vector<BootstrapRound>& rounds) {
+  std::vector<Snapshot> snapshots;
+  std::stop_source stop;
+  BootstrapWatch watch;
+  watch.stop = stop.get_token();
+  int seen = 0;
+  watch.checkpoint = [&](const auto& state) {
+    const auto now = state();
+    if (now.trainings == seen || !now.field) return;
+    seen = now.trainings;
+    snapshots.push_back({now.joined, *now.field});
+    if (first_only) stop.request_stop();
+  };
+  watch.each_round = [&](const BootstrapRound& round) {
+    rounds.push_back(round);
+    std::printf("  round %d: %zu registrations, %zu scans tried, %zu joined below %.2f mm of %.2f to %.2f\n",
+                round.round, round.registrations, round.scans.size(), round.joined, 1000 * round.accepted_below,
+                1000 * round.smallest, 1000 * round.largest);
+    std::fflush(stdout);
+  };
+  bootstrapBody(inputs, trainerOf(epochs), options, watch);
+  return snapshots;
+}
+
+/// Mean distances over all trials, mm.
+struct Measured {
+  double model_posed = 0, model_rest = 0, posed = 0, rest = 0, worst = 0, seconds = 0;
+};
+
+double distanceAtRest(const Vertices& shape, const Vertices& truth) {
+  return 1000 * meanVertexDistance(apply(alignRigidly(shape, truth), shape), truth);
+}
+
+Measured measured(const BootstrapInputs& inputs, const BootstrapOptions& options, const Snapshot& snapshot,
+                  const std::vector<Trial>& trials) {
+  auto registrations = inputs.registrations;
+  registrations.insert(registrations.end(), snapshot.joined.begin(), snapshot.joined.end());
+  BodyTrainingOptions training;
+  training.posture = options.posture;
+  training.modes = options.modes;
+  const BodyModel model = trainBody(inputs.reference, registrations, training)->model;
+  ScanRegistrationOptions registration = options.registration;
+  registration.field = FieldDeformation::make(model, snapshot.field);
+  std::vector<Measured> each(trials.size());
+  const Stopwatch watch;
+  tbb::parallel_for(std::size_t{0}, trials.size(), [&](std::size_t i) {
+    const auto& [scan, posed, rest] = trials[i];
+    const auto found = registerScan(scan, model, {}, registration).solution;
+    each[i] = {1000 * meanVertexDistance(model.posed(found.state).vertices(), posed),
+               distanceAtRest(model.rest(found.state.identity), rest), 1000 * meanVertexDistance(found.vertices, posed),
+               found.field ? distanceAtRest(found.field->rest, rest) : 0};
+  });
+  Measured sum;
+  const double count = double(trials.size());
+  for (const auto& one : each) {
+    sum.model_posed += one.model_posed / count;
+    sum.model_rest += one.model_rest / count;
+    sum.posed += one.posed / count;
+    sum.rest += one.rest / count;
+    sum.worst = std::max(sum.worst, one.posed);
+  }
+  sum.seconds = watch.cpu() / count;
+  return sum;
+}
+
+void tell(Report& report, const std::string& what, const Measured& of) {
+  report.entry(what + ", v2v posed: model's fit; with the field, mean (worst)",
+               text("%.2f; %.2f (%.2f) mm, %.2f times", of.model_posed, of.posed, of.worst, of.posed / of.model_posed));
+  report.entry(what + ", v2v at rest: model's fit; with the field; CPU s a scan",
+               text("%.2f; %.2f mm, %.2f times; %.2f s", of.model_rest, of.rest, of.rest / of.model_rest, of.seconds));
+}
+
+}  // namespace
+
+int setting(const char* name, int otherwise) {
+  const char* text = std::getenv(name);
+  return text ? std::atoi(text) : otherwise;
+}
+
+void grow(Report& report, BootstrapInputs inputs, const BootstrapOptions& options, const std::vector<Trial>& trials) {
+  const int epochs = setting("SHAPED_EPOCHS", 20);
+  std::vector<BootstrapRound> rounds;
+  const auto snapshots = snapshotsOf(inputs, options, epochs, false, rounds);
+  for (std::size_t s = 0; s < snapshots.size(); ++s)
+    tell(report,
+         text("after %zu rounds, %zu registrations", s, inputs.registrations.size() + snapshots[s].joined.size()),
+         measured(inputs, options, snapshots[s], trials));
+  for (std::size_t i = 0, count = inputs.registrations.size(); i < count; ++i)
+    inputs.examples.push_back({inputs.registrations[i], std::nullopt});
+  inputs.registrations.clear();
+  for (const auto& example : inputs.examples) inputs.registrations.push_back(example.registration);
+  const auto all = snapshotsOf(inputs, options, epochs, true, rounds);
+  tell(report, "model and field of all registrations", measured(inputs, options, all.front(), trials));
+}
+
+BootstrapInputs growthInputs(const PostureTemplate& reference, const std::vector<Vertices>& known,
+                             std::shared_ptr<const std::vector<Scan>> scans) {
+  BootstrapInputs inputs{reference, {}, {}, {}};
+  for (std::size_t i = 0; i < known.size(); ++i) {
+    if (i < known.size() / 2)
+      inputs.registrations.push_back(known[i]);
+    else
+      inputs.examples.push_back({known[i], std::nullopt});
+  }
+  inputs.scans = {scans->size(), [scans](std::size_t i) { return (*scans)[i]; },
+                  [](std::size_t i) { return "scan " + std::to_string(i); }};
+  return inputs;
+}
+
+BootstrapOptions growthOptions() {
+  BootstrapOptions options;
+  options.posture = PostureNormalisation::kNone;
+  options.rounds = setting("SHAPED_ROUNDS", 3);
+  return options;
+}
+
+}  // namespace shaped::experiments

@@ -1,0 +1,31 @@
+#pragma once
+
+#include <memory>
+#include <vector>
+
+#include "core/bootstrap/bootstrap.h"
+#include "tests/benchmark/experiments/experiment.h"
+
+namespace shaped::experiments {
+
+/// A scan that a model is measured on.
+struct Trial {
+  Scan scan;
+  Vertices posed, rest;  ///< the truth in the scan's place, and at rest
+};
+
+/// A whole number that the environment may name.
+int setting(const char* name, int otherwise);
+
+/// Half of `known` for the model, half for the field; the scans are made as they are asked for.
+BootstrapInputs growthInputs(const PostureTemplate& reference, const std::vector<Vertices>& known,
+                             std::shared_ptr<const std::vector<Scan>> scans);
+
+/// The paper's, over SHAPED_ROUNDS rounds; registrations stand at rest.
+BootstrapOptions growthOptions();
+
+/// Tells what the model and its field make of the trials before each round and at the end, then what a model and a
+/// field of all registrations at once do.
+void grow(Report& report, BootstrapInputs inputs, const BootstrapOptions& options, const std::vector<Trial>& trials);
+
+}  // namespace shaped::experiments
