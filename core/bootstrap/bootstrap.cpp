@@ -11,7 +11,9 @@
 #include "core/bootstrap/field_examples.h"
 #include "core/bootstrap/field_judgement.h"
 #include "core/bootstrap/round_scans.h"
+#include "core/mesh/quality.h"
 #include "core/numerics/error.h"
+#include "core/registration/fit_evidence.h"
 #include "core/registration/scan_checks.h"
 #include "core/surface/laplacian.h"
 
@@ -114,6 +116,8 @@ class Bootstrap {
       throw InvalidInput("examples",
                          "none can be fitted by the model, so that there is nothing to train a field on; "
                          "do the scans show what the registrations do?");
+    const auto smoothness = smoothnessOf(*set.reference, set.pairs);
+    if (smoothness.prior) smooth(*set.reference, *smoothness.prior, set.pairs);
     const auto judges = takeJudges(set.pairs);
     set.scaling = scalingOf(*set.reference);
     tell("training the field on " + std::to_string(set.pairs.size()) + " scans", kFieldBegins);
@@ -122,6 +126,7 @@ class Bootstrap {
     const JacobianField complete(*field);  // says what does not fit
     if (!judges.empty()) field = judged(set, std::move(*field), judges);
     field->regression = std::move(regression.weights);
+    field->smoothness = smoothness.prior;
     note([&] {
       state_.field = std::move(field);
       ++state_.trainings;
@@ -185,6 +190,25 @@ class Bootstrap {
     for (auto& pair : pairs)
       if (pair) usable.push_back(std::move(*pair));
     return usable;
+  }
+
+  /// How what the regression leaves may be smoothed over the surface.
+  FittedSmoothness smoothnessOf(const FieldReference& reference, const std::vector<RestPair>& pairs) const {
+    std::vector<SmoothExample> examples(pairs.size());
+    forAll(pairs.size(), [&](std::size_t k) {
+      const auto& pair = pairs[k];
+      const Vertices normals = vertexNormals(reference.poisson->topology().faces(), pair.source);
+      examples[k] = {normals, scanOffsets(pair.source, normals, pair.scan), pair.target - pair.source};
+    });
+    if (stopped()) return {};
+    return fitSmoothness(reference.spectrum, boundingBoxDiagonal(reference.shape), examples);
+  }
+
+  /// Brings the pairs' sources as near as a fit's surface is when the field sees it.
+  void smooth(const FieldReference& reference, const SmoothPrior& prior, std::vector<RestPair>& pairs) const {
+    forAll(pairs.size(), [&](std::size_t k) {
+      pairs[k].source += smoothDisplacements(reference, prior, pairs[k].source, pairs[k].scan);
+    });
   }
 
   bool taught(std::size_t i) const { return state_.examples[i] && state_.examples[i]->identity.size() > 0; }

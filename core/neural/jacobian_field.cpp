@@ -44,11 +44,17 @@ Eigen::Index JacobianFieldWeights::localInputs() const {
          (offsets ? kOffsetInputs : 0);
 }
 
+bool isSilent(const JacobianFieldWeights& weights) {
+  const auto& last = weights.mlp.back();
+  return last.weight.isZero(0) && last.bias.isZero(0);
+}
+
 JacobianField::JacobianField(JacobianFieldWeights weights)
     : weights_(std::move(weights)),
       source_net_(weights_.source_net, "source_net"),
       scan_net_(weights_.scan_net, "scan_net") {
   requireScaling(weights_.scaling);
+  if (weights_.smoothness) require(*weights_.smoothness);
   requireInputs(source_net_, kTriangleInputs);
   requireInputs(scan_net_, kScanInputs);
   const Mlp mlp(weights_.mlp);

@@ -6,6 +6,7 @@
 #include "core/neural/dense_layers.h"
 #include "core/neural/jacobian_field_features.h"
 #include "core/neural/residual_regression.h"
+#include "core/neural/smooth_residual.h"
 
 namespace shaped {
 
@@ -25,10 +26,15 @@ struct JacobianFieldWeights {
   /// Our addition: what a fit goes through before the field sees it, for whoever applies a field to fits. The field
   /// itself leaves it alone; it is of one topology.
   std::optional<ResidualRegressionWeights> regression = std::nullopt;
+  /// Likewise, after the regression; of any topology of the same kind of body.
+  std::optional<SmoothPrior> smoothness = std::nullopt;
 
   /// Inputs that a triangle has of its own; those of the whole shape and scan come after.
   Eigen::Index localInputs() const;
 };
+
+/// Whether the field leaves every shape as it is: its last layer is all zeros.
+bool isSilent(const JacobianFieldWeights& weights);
 
 /// Neural Jacobian field [Aigerman et al. 2022; Muralikrishnan 2025, section 3.3.3 and appendix B.4.1]: says from what
 /// a shape and a scan of another look like at each triangle how that triangle is to be deformed, and the Poisson
@@ -38,8 +44,8 @@ struct JacobianFieldWeights {
 /// layer has not been trained) leave the source as it is. Immutable; usable from several threads at once.
 class JacobianField {
  public:
-  /// Throws InvalidInput naming `scaling`, or the network and its layer, when their sizes do not fit together or a
-  /// number is not finite.
+  /// Throws InvalidInput naming `scaling`, `prior` (of smoothness), or the network and its layer, when their sizes do
+  /// not fit together or a number is not finite.
   explicit JacobianField(JacobianFieldWeights weights);
 
   /// The Jacobians that each triangle is to have, relative to the reference of the features, F x 9. Throws InvalidInput

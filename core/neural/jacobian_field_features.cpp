@@ -13,7 +13,7 @@
 namespace shaped {
 namespace {
 
-constexpr int kEigenfunctions = 100;
+constexpr int kEigenfunctions = 200, kSignatureFunctions = 100;
 /// Of the extent: offsets of a good fit are about 1 in this unit.
 constexpr double kOffsetUnit = 0.01;
 /// Of that unit: how far a scan's hole is from the source says nothing.
@@ -36,15 +36,24 @@ Rows meansOfCorners(const Faces& faces, const Rows& vertices) {
   return means;
 }
 
-Eigen::MatrixXf signaturesOf(const Topology& topology, const Vertices& shape, const std::stop_token& stop) {
+/// Nothing once the token has fired.
+std::optional<SurfaceSpectrum> spectrumOf(const Topology& topology, const Vertices& shape,
+                                          const std::stop_token& stop) {
   SpectrumOptions options;
   options.count = std::min<int>(kEigenfunctions, topology.vertexCount());
-  const auto spectrum = surfaceSpectrum(topology, shape, options, stop);
-  if (spectrum.termination == Termination::kCancelled) return {};
+  auto spectrum = surfaceSpectrum(topology, shape, options, stop);
+  if (spectrum.termination == Termination::kCancelled) return std::nullopt;
   if (!spectrum.converged())
     throw InvalidInput("reference", "has triangles too thin to find the eigenfunctions of its Laplacian; repair it");
-  const Eigen::MatrixXd signatures = waveKernelSignature(spectrum.solution, {.energies = kFieldSignatures});
-  return meansOfCorners(topology.faces(), signatures).cast<float>();
+  return std::move(spectrum.solution);
+}
+
+Eigen::MatrixXf signaturesOf(const Faces& faces, const SurfaceSpectrum& spectrum) {
+  const auto count = std::min<Eigen::Index>(kSignatureFunctions, spectrum.eigenvalues.size());
+  const SurfaceSpectrum lowest{spectrum.eigenvalues.head(count), spectrum.eigenfunctions.leftCols(count),
+                               spectrum.areas};
+  const Eigen::MatrixXd signatures = waveKernelSignature(lowest, {.energies = kFieldSignatures});
+  return meansOfCorners(faces, signatures).cast<float>();
 }
 
 void requireScan(const Scan& scan) {
@@ -110,11 +119,12 @@ void lookUpNearest(const PointTree& tree, const Scan& scan, const Vertices& cent
 std::optional<FieldReference> makeFieldReference(TopologyPtr topology, const Vertices& shape,
                                                  const std::stop_token& stop) {
   requireValidShape(*topology, shape, "reference");
-  FieldReference reference{shape, JacobianPoisson::make(topology, shape, stop), {}};
-  if (!reference.poisson) return std::nullopt;
-  reference.signatures = signaturesOf(*topology, shape, stop);
-  if (reference.signatures.size() == 0) return std::nullopt;
-  return reference;
+  auto poisson = JacobianPoisson::make(topology, shape, stop);
+  if (!poisson) return std::nullopt;
+  auto spectrum = spectrumOf(*topology, shape, stop);
+  if (!spectrum) return std::nullopt;
+  Eigen::MatrixXf signatures = signaturesOf(topology->faces(), *spectrum);
+  return FieldReference{shape, std::move(poisson), std::move(*spectrum), std::move(signatures)};
 }
 
 FieldScaling scalingOf(const FieldReference& reference) {

@@ -8,6 +8,7 @@
 
 #include "core/mesh/scan.h"
 #include "core/neural/jacobian_poisson.h"
+#include "core/surface/spectrum.h"
 
 namespace shaped {
 
@@ -24,14 +25,15 @@ constexpr int kOffsetInputs = 15;
 struct FieldReference {
   Vertices shape;                                  ///< V x 3 [m]
   std::shared_ptr<const JacobianPoisson> poisson;  ///< on that shape
+  SurfaceSpectrum spectrum;                        ///< of that shape, 200 functions (all V where there are fewer)
   Eigen::MatrixXf signatures;                      ///< F x 50: wave kernel signatures, mean of each triangle's corners
 };
 
-/// Factorises the Poisson equation and computes signatures from the 100 lowest eigenfunctions (all V where there are
-/// fewer). They are the reference's and stand in for those of every shape of its topology: signatures hardly change
-/// from one identity to the next (they tell where on the body a triangle is), and an eigenproblem for each shape would
-/// cost more than the field. Nothing once the stop token has fired. Throws InvalidInput naming `reference` when it is
-/// not a valid shape of the topology, or its triangles are too thin for either.
+/// Factorises the Poisson equation, finds the lowest eigenfunctions and computes signatures from the 100 lowest. They
+/// are the reference's and stand in for those of every shape of its topology: signatures hardly change from one
+/// identity to the next (they tell where on the body a triangle is), and an eigenproblem for each shape would cost more
+/// than the field. Nothing once the stop token has fired. Throws InvalidInput naming `reference` when it is not a valid
+/// shape of the topology, or its triangles are too thin for either.
 std::optional<FieldReference> makeFieldReference(TopologyPtr topology, const Vertices& shape,
                                                  const std::stop_token& stop = {});
 

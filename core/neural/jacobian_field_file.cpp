@@ -47,6 +47,8 @@ void addJacobianField(const std::string& name, const JacobianFieldWeights& weigh
   addNet(name + ".scan_net", weights.scan_net, file);
   addNet(name + ".mlp", weights.mlp, file);
   if (weights.regression) addRegression(name + ".regression", *weights.regression, file);
+  if (weights.smoothness)
+    file.addMatrix(name + ".smoothness", Eigen::RowVector2d(weights.smoothness->reach, weights.smoothness->noise));
 }
 
 JacobianFieldWeights readJacobianField(const TensorFile& file, const std::string& name) {
@@ -59,6 +61,10 @@ JacobianFieldWeights readJacobianField(const TensorFile& file, const std::string
   weights.source_net = readNet(file, name + ".source_net");
   weights.scan_net = readNet(file, name + ".scan_net");
   weights.mlp = readNet(file, name + ".mlp");
+  if (file.has(name + ".smoothness")) {
+    const Eigen::RowVector2d prior = file.matrix<double>(name + ".smoothness", 1, 2);
+    weights.smoothness = SmoothPrior{prior[0], prior[1]};
+  }
   if (file.has(name + ".regression.mean")) weights.regression = readRegression(file, name + ".regression");
   return weights;
 }

@@ -102,6 +102,12 @@ Scan scanAtRest(const BodyModel& model, const BodyState& state, const ScanSurfac
   return rest;
 }
 
+Vertices smoothDisplacements(const FieldReference& reference, const SmoothPrior& prior, const Vertices& rest,
+                             const Scan& scan) {
+  const Vertices normals = vertexNormals(reference.poisson->topology().faces(), rest);
+  return smoothResidual(reference.spectrum, prior, normals, scanOffsets(rest, normals, scan));
+}
+
 std::shared_ptr<const FieldDeformation> FieldDeformation::make(const BodyModel& model, JacobianFieldWeights weights,
                                                                const std::stop_token& stop) {
   auto reference = makeFieldReference(model.topology(), model.parts().mean, stop);
@@ -121,40 +127,36 @@ std::optional<DeformedBody> FieldDeformation::deform(const BodyModel& model, con
     throw InvalidInput("model", "is of another topology than the field's reference: make the field's of this model");
   Scan seen = scanAtRest(model, state, scan);
   if (seen.points.rows() < kFewestScanPoints) return std::nullopt;
-  std::optional<Vertices> rest;
+  const auto& faces = model.topology()->faces();
+  Vertices rest = model.rest(state.identity);
   Pose pose = state.pose;
   if (regression_) {
-    const Vertices fitted = model.rest(state.identity);
-    const auto residual = regression_->predict(evidenceOf(state, fitted, model.topology()->faces(), seen));
-    const auto start = refitPose(model, fitted + residual, state.pose, scan, fit);
+    rest += regression_->predict(evidenceOf(state, rest, faces, seen));
+    const auto start = refitPose(model, rest, pose, scan, fit);
     pose = start.state.pose;
     seen = scanAtRest(start.body, start.state, scan);
     if (seen.points.rows() < kFewestScanPoints) return std::nullopt;
-    rest = deformed(start.body, start.state, seen);
-  } else {
-    rest = deformed(model, state, seen);
   }
-  if (!rest) return std::nullopt;
-  const auto body = refitPose(model, *rest, pose, scan, fit);
-  return DeformedBody{std::move(*rest), body.state.pose, body.posed()};
-}
-
-/// The field alone; nothing where it overflows.
-std::optional<Vertices> FieldDeformation::deformed(const BodyModel& model, const BodyState& state,
-                                                   const Scan& seen) const {
-  const auto features = jacobianFieldFeatures(*reference_, model.rest(state.identity), seen, field_.weights().scaling);
-  const auto jacobians = field_.predict(features);
-  if (!jacobians.allFinite()) return std::nullopt;
-  return reference_->poisson->solve(jacobians, features.centroids);
+  if (const auto& prior = field_.weights().smoothness) rest += smoothDisplacements(*reference_, *prior, rest, seen);
+  if (!isSilent(field_.weights())) {
+    const auto features = jacobianFieldFeatures(*reference_, rest, seen, field_.weights().scaling);
+    const auto jacobians = field_.predict(features);
+    if (!jacobians.allFinite()) return std::nullopt;
+    rest = reference_->poisson->solve(jacobians, features.centroids);
+  }
+  const auto body = refitPose(model, rest, pose, scan, fit);
+  return DeformedBody{std::move(rest), body.state.pose, body.posed()};
 }
 
 std::size_t FieldDeformation::bytes() const {
   const auto& weights = field_.weights();
+  const auto& spectrum = reference_->spectrum;
   Eigen::Index numbers = reference_->signatures.size();
   for (const auto* net : {&weights.source_net, &weights.scan_net, &weights.mlp})
     for (const auto& layer : *net) numbers += layer.weight.size() + layer.bias.size();
   return reference_->poisson->bytes() + (regression_ ? regression_->bytes() : 0) +
-         sizeof(double) * static_cast<std::size_t>(reference_->shape.size()) +
+         sizeof(double) * static_cast<std::size_t>(reference_->shape.size() + spectrum.eigenfunctions.size() +
+                                                   spectrum.areas.size()) +
          sizeof(float) * static_cast<std::size_t>(numbers);
 }
 

@@ -28,6 +28,10 @@ struct RestScanOptions {
 Scan scanAtRest(const BodyModel& model, const BodyState& state, const ScanSurface& scan,
                 const RestScanOptions& options = {});
 
+/// smoothResidual of a surface at rest (V x 3) as a scan shows it there, V x 3.
+Vertices smoothDisplacements(const FieldReference& reference, const SmoothPrior& prior, const Vertices& rest,
+                             const Scan& scan);
+
 /// A body's surface as a field sees it on a scan.
 struct DeformedBody {
   Vertices rest;   ///< X' of [Mur25] Algorithm 2, V x 3, in the model's rest pose
@@ -46,9 +50,10 @@ class FieldDeformation {
   FieldDeformation(std::shared_ptr<const FieldReference> reference, JacobianFieldWeights weights);
 
   /// X_o = model.rest(state.identity) deformed to X'. Where the field comes with a regression, that goes first: it adds
-  /// to X_o what it makes of the fit's evidence, and the pose is fitted anew. Then the field, of what scanAtRest() then
-  /// shows. It says nothing of places: at rest each component stays centred where it was. At last the pose of X' is
-  /// fitted to the scan (refitPose), as that of X_o has made up for what X_o lacked. fit: how.
+  /// to X_o what it makes of the fit's evidence, and the pose is fitted anew. Then what smoothResidual makes of the
+  /// scan as it then comes to rest, where the field comes with a prior for it; then the field, of the same scan, unless
+  /// it is silent. It says nothing of places: at rest each component stays centred where it was. At last the pose of X'
+  /// is fitted to the scan (refitPose), as that of X_o has made up for what X_o lacked. fit: how.
   ///
   /// Nothing when fewer than kFewestScanPoints points of the scan come to rest, or the field's single precision
   /// overflows on what it sees. Throws InvalidInput naming `model` when its topology is not the field's reference's, or
@@ -61,8 +66,6 @@ class FieldDeformation {
   std::size_t bytes() const;
 
  private:
-  std::optional<Vertices> deformed(const BodyModel& model, const BodyState& state, const Scan& seen) const;
-
   std::shared_ptr<const FieldReference> reference_;
   JacobianField field_;
   std::optional<ResidualRegression> regression_;

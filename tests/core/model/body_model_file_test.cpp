@@ -182,6 +182,7 @@ TEST_CASE("a body model takes its field and how it grew along") {
   regressing.regression = ResidualRegressionWeights{
       Eigen::MatrixXf::Random(vertices, 2), Eigen::MatrixXf::Random(model.modeCount() + turns, 2),
       Eigen::VectorXf::Random(3 * vertices), Eigen::MatrixXf::Random(3 * vertices, 2)};
+  regressing.smoothness = SmoothPrior{0.21, 3e-4};
   publishBody(directory, "regressing", model, grown, {}, &regressing);
   const auto again = loadBody(directory.load("regressing"));
   REQUIRE(again.field->regression);
@@ -189,7 +190,11 @@ TEST_CASE("a body model takes its field and how it grew along") {
   CHECK(again.field->regression->state_weights == regressing.regression->state_weights);
   CHECK(again.field->regression->mean == regressing.regression->mean);
   CHECK(again.field->regression->modes == regressing.regression->modes);
+  REQUIRE(again.field->smoothness);
+  CHECK(again.field->smoothness->reach == 0.21);
+  CHECK(again.field->smoothness->noise == 3e-4);
   CHECK_FALSE(loaded.field->regression);
+  CHECK_FALSE(loaded.field->smoothness);
   regressing.regression->state_weights.conservativeResize(turns, 2);
   publishBody(directory, "other", model, grown, {}, &regressing);
   CHECK_THROWS_WITH(loadBody(directory.load("other")), Catch::Contains("field.regression"));

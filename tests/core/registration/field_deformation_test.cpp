@@ -164,6 +164,36 @@ TEST_CASE("a field's regression goes first, and the pose of what comes out is fi
   CHECK(maxVertexDistance(deformed->posed, tube.surface) < 2e-3);
 }
 
+TEST_CASE("with a prior, what a scan shows of a body that no identity says is smoothed over its surface") {
+  const PosedTube tube;
+  const auto reference = tube.reference();
+  auto weights = constantField(scalingOf(*reference));
+  weights.smoothness = SmoothPrior{0.3, 1e-3};
+  const BodyModel poor = tube.model.truncated(1);
+  const BodyState fit{tube.state.identity.head(1), tube.state.pose};
+  const ScanSurface scan(tube.scan(4000));
+  const FieldDeformation field(reference, weights);
+  const auto deformed = field.deform(poor, fit, scan);
+  REQUIRE(deformed);
+  const Vertices rest = poor.rest(fit.identity);
+  CHECK(deformed->rest ==
+        rest + smoothDisplacements(*reference, *weights.smoothness, rest, scanAtRest(poor, fit, scan)));
+  const auto off = [&](const Vertices& shape) { return distancesToSurface(shape, tube.rest, tube.faces).mean(); };
+  CHECK(off(deformed->rest) < 0.4 * off(rest));
+  CHECK(distancesToSurface(deformed->posed, tube.surface, tube.faces).mean() <
+        0.4 * distancesToSurface(poor.posed(fit).vertices(), tube.surface, tube.faces).mean());
+
+  // The field sees what the prior has made.
+  auto both = randomField(weights.scaling);
+  both.smoothness = weights.smoothness;
+  const auto features = jacobianFieldFeatures(*reference, deformed->rest, scanAtRest(poor, fit, scan), both.scaling);
+  const Vertices expected = reference->poisson->solve(JacobianField(both).predict(features), features.centroids);
+  CHECK(FieldDeformation(reference, both).deform(poor, fit, scan)->rest == expected);
+
+  weights.smoothness->noise = -1;
+  CHECK_THROWS_WITH(FieldDeformation(reference, weights), Catch::Contains("noise"));
+}
+
 TEST_CASE("what a field makes of a body at rest does not depend on where its scan lies") {
   const PosedTube tube;
   const auto reference = tube.reference();
@@ -188,7 +218,7 @@ TEST_CASE("a field needs points of the scan, and a model of its topology") {
   Scan elsewhere = tube.scan(2000);
   elsewhere.points.array() += 5;
   CHECK_FALSE(field.deform(tube.model, tube.state, ScanSurface(elsewhere)));
-  auto overflowing = field.weights();
+  auto overflowing = randomField(field.weights().scaling);
   overflowing.mlp[0].weight.setConstant(3e38F);
   CHECK_FALSE(FieldDeformation(reference, overflowing).deform(tube.model, tube.state, ScanSurface(tube.scan(2000))));
   BodyParts parts = tube.model.parts();
