@@ -31,4 +31,15 @@ void registerSequence(const std::shared_ptr<grpc::Channel>& channel, const v1::R
   converse(call, *stream, setup, count, frame, answer);
 }
 
+void estimateUnderClothing(const std::shared_ptr<grpc::Channel>& channel,
+                           const v1::EstimateUnderClothingRequest::Setup& setup, std::int64_t count,
+                           const std::function<v1::EstimateUnderClothingRequest::Frame(std::int64_t index)>& frame,
+                           const CallOptions& options,
+                           const std::function<void(const v1::EstimateUnderClothingResponse&)>& answer) {
+  const auto stub = v1::Registration::NewStub(channel);
+  Call call(options);
+  const auto stream = stub->EstimateUnderClothing(call.context());
+  converse(call, *stream, setup, count, frame, answer);
+}
+
 }  // namespace shaped::client
