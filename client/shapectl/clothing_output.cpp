@@ -55,7 +55,7 @@ void ClothingOutput::add(const Frame& frame) {
   const auto& scan = scans_.at(frame.frame());
   document_["frames"].push_back(toJson(frame, scan));
   table_ += lineOf(frame);
-  if (code_ == ExitCode::kSuccess) code_ = exitCodeOf(frame.report());
+  if (frame.report().termination() == v1::TERMINATION_NUMERICAL_FAILURE) code_ = ExitCode::kNotConverged;
   for (const auto& warning : frame.warnings())
     warnings_ += "warning: frame " + std::to_string(frame.frame()) + " (" + scan + "): " + warning + "\n";
 }

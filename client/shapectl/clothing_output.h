@@ -22,7 +22,8 @@ class ClothingOutput {
   const nlohmann::json& document() const { return document_; }
   /// A line about the body, and a table of the frames.
   std::string text() const;
-  /// Success when the identity and all postures converged.
+  /// Success when the identity converged and no posture failed. That a posture was still moving by tenths of a
+  /// millimetre when its rounds were over is how most end.
   ExitCode exitCode() const { return code_; }
 
  private:
