@@ -74,6 +74,7 @@ class Clothing(DaemonCase):
             self.assertGreater(frame["mean_gap"], 0)
             self.assertLess(frame["mean_gap"], 2 * CLOTH)
         # The same person at rest and in every frame, as their coefficients make them.
+        weights = self.folder / "weights.json"
         for frame, shape in zip(document["frames"], shapes):
             weights.write_text(json.dumps(frame["coefficients"]))
             self.expect(SUCCESS, "synthesize", "bends", "--coefficients", weights, "-o", self.folder / "again.obj")
