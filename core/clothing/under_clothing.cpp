@@ -62,10 +62,10 @@ class Estimation {
       postures.loss_scale = options_.posture_loss_scale;
       if (pass == std::min(1, options_.passes - 1)) reseat(postures, tightness);
       settlePostures(postures, tightness);
-      if (pass > 0)
-        tell(options_, "pass " + std::to_string(pass + 1), 0.7 + 0.3 * double(pass + 1) / double(options_.passes));
       if (options_.stop.stop_requested()) result.termination = Termination::kCancelled;
       if (result.termination == Termination::kCancelled) return result;  // measuring would take long
+      if (pass > 0)
+        tell(options_, "pass " + std::to_string(pass + 1), 0.7 + 0.3 * double(pass + 1) / double(options_.passes));
     }
     result.solution.identity = state_.identity;
     result.solution.frames = measured();

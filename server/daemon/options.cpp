@@ -240,7 +240,7 @@ std::vector<OptionSpec> limitOptions() {
       countOption(
           "max-clothing-megabytes", "N", When::kAtStart, kMostMegabytes,
           [](auto& o) -> auto& { return o.limits.clothing_bytes; },
-          "scans that one estimate under clothing may hold in memory; the work takes about five times as much [MiB]",
+          "scans that one estimate under clothing may hold in memory; the work takes about six times as much [MiB]",
           1 << 20),
       countOption(
           "max-upload-megabytes", "N", When::kAtStart, kMostCount,
