@@ -1,28 +1,9 @@
 #include "client/marker_fit.h"
 
-#include <thread>
-
 #include "client/mesh.h"
+#include "client/two_way_stream.h"
 
 namespace shaped::client {
-namespace {
-
-using Stream = grpc::ClientReaderWriter<v1::FitMarkersRequest, v1::FitMarkersResponse>;
-
-void sendAll(Stream& stream, const v1::FitMarkersRequest::Setup& setup, const MarkerFrames& frames) {
-  v1::FitMarkersRequest message;
-  *message.mutable_setup() = setup;
-  // A failed write means that the daemon has ended the stream: the reader hears why.
-  bool open = stream.Write(message);
-  for (const auto number : frames.numbers) {
-    if (!open) break;
-    *message.mutable_frame() = packFrame(frames, number);
-    open = stream.Write(message);
-  }
-  stream.WritesDone();
-}
-
-}  // namespace
 
 v1::MarkerFrame packFrame(const MarkerFrames& frames, std::int64_t number) {
   v1::MarkerFrame frame;
@@ -53,17 +34,10 @@ void fitMarkers(const std::shared_ptr<grpc::Channel>& channel, const v1::FitMark
   const auto stub = v1::Shapes::NewStub(channel);
   Call call(options);
   const auto stream = stub->FitMarkers(call.context());
-  std::thread sender([&] { sendAll(*stream, setup, frames); });
-  try {
-    for (v1::FitMarkersResponse response; stream->Read(&response);) answer(response);
-  } catch (...) {
-    call.context()->TryCancel();
-    sender.join();
-    stream->Finish();
-    throw;
-  }
-  sender.join();
-  require(stream->Finish());
+  const auto frame = [&](std::int64_t index) {
+    return packFrame(frames, frames.numbers[static_cast<std::size_t>(index)]);
+  };
+  converse(call, *stream, setup, std::ssize(frames.numbers), frame, answer);
 }
 
 }  // namespace shaped::client

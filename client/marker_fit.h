@@ -22,7 +22,8 @@ struct MarkerFrames {
 v1::MarkerFrame packFrame(const MarkerFrames& frames, std::int64_t number);
 
 /// Streams the frames and hears an answer for each, in order, while later frames are still being sent.
-/// Throws RpcError when the daemon refuses or the call is aborted, and whatever `answer` throws.
+/// Throws RpcError when the daemon refuses or the call is aborted, and whatever `frames` and `answer`
+/// throw.
 void fitMarkers(const std::shared_ptr<grpc::Channel>& channel, const v1::FitMarkersRequest::Setup& setup,
                 const MarkerFrames& frames, const CallOptions& options,
                 const std::function<void(const v1::FitMarkersResponse&)>& answer);

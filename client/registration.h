@@ -24,4 +24,12 @@ void registerSequence(const std::shared_ptr<grpc::Channel>& channel, const v1::R
                       const std::function<v1::RegisterSequenceRequest::Frame(std::int64_t index)>& frame,
                       const CallOptions& options, const std::function<void(const v1::RegisterResponse&)>& answer);
 
+/// Streams `count` frames, made one after the other by `frame`; once all have been sent and worked on together, hears
+/// the body and then an answer for each, in order. Throws as registerSequence().
+void estimateUnderClothing(const std::shared_ptr<grpc::Channel>& channel,
+                           const v1::EstimateUnderClothingRequest::Setup& setup, std::int64_t count,
+                           const std::function<v1::EstimateUnderClothingRequest::Frame(std::int64_t index)>& frame,
+                           const CallOptions& options,
+                           const std::function<void(const v1::EstimateUnderClothingResponse&)>& answer);
+
 }  // namespace shaped::client

@@ -28,26 +28,49 @@ v1::ScanLandmark landmarkFrom(const nlohmann::json& entry) {
   return landmark;
 }
 
-}  // namespace
-
-std::vector<v1::ScanLandmark> readScanLandmarks(const std::filesystem::path& path) {
+/// Gives each landmark of the file to take(entry, landmark). fields: that are wanted beside a landmark's own. Throws
+/// InvalidInput naming the file and the landmark.
+template <class Take>
+void readEach(const std::filesystem::path& path, const std::string& fields, const Take& take) {
   const auto document = parseJson(path.string(), readFile(path));
   if (!document.is_object() || !document.contains("landmarks") || !document.at("landmarks").is_array())
     throw InvalidInput(path.string(), "want {\"landmarks\": [...]}");
-  std::vector<v1::ScanLandmark> landmarks;
+  std::size_t index = 0;
   const auto refuse = [&](const std::string& problem) {
-    throw InvalidInput(path.string(), "landmarks[" + std::to_string(landmarks.size()) +
+    throw InvalidInput(path.string(), "landmarks[" + std::to_string(index) +
                                           "]: want {\"vertex\": i or \"face\": f, \"barycentric\": [3 weights], "
-                                          "\"position\": [3 numbers]}" +
-                                          problem);
+                                          "\"position\": [3 numbers]" +
+                                          fields + "}" + problem);
   };
   try {
-    for (const auto& entry : document.at("landmarks")) landmarks.push_back(landmarkFrom(entry));
+    for (const auto& entry : document.at("landmarks")) {
+      take(entry, landmarkFrom(entry));
+      ++index;
+    }
   } catch (const InvalidInput& error) {
     refuse(std::string(": ") + error.what());
   } catch (const nlohmann::json::exception&) {  // a field is missing or of another type
     refuse("");
   }
+}
+
+}  // namespace
+
+std::vector<v1::ScanLandmark> readScanLandmarks(const std::filesystem::path& path) {
+  std::vector<v1::ScanLandmark> landmarks;
+  readEach(path, "",
+           [&](const nlohmann::json&, v1::ScanLandmark landmark) { landmarks.push_back(std::move(landmark)); });
+  return landmarks;
+}
+
+std::vector<std::vector<v1::ScanLandmark>> readSequenceLandmarks(const std::filesystem::path& path,
+                                                                 std::int64_t scans) {
+  std::vector<std::vector<v1::ScanLandmark>> landmarks(static_cast<std::size_t>(scans));
+  readEach(path, ", \"frame\": index of the scan", [&](const nlohmann::json& entry, v1::ScanLandmark landmark) {
+    const bool only = scans == 1 && !entry.contains("frame");
+    const auto frame = only ? 0 : requireWholeNumber(entry, "frame", 0, scans - 1);
+    landmarks[static_cast<std::size_t>(frame)].push_back(std::move(landmark));
+  });
   return landmarks;
 }
 

@@ -14,4 +14,8 @@ namespace shaped::shapectl {
 /// what is not on the model, the daemon says.
 std::vector<v1::ScanLandmark> readScanLandmarks(const std::filesystem::path& path);
 
+/// The same of several scans, a list for each of `scans`: every landmark also has "frame", the scan's index from 0,
+/// which may be left out where there is one scan.
+std::vector<std::vector<v1::ScanLandmark>> readSequenceLandmarks(const std::filesystem::path& path, std::int64_t scans);
+
 }  // namespace shaped::shapectl

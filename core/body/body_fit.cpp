@@ -43,7 +43,8 @@ class StopCallback : public ceres::IterationCallback {
 /// parameters. It has the same steps, gradients and costs, and spares Ceres the work on thousands of rows.
 class Cost : public ceres::CostFunction {
  public:
-  Cost(const BodyModel& model, const BodyResiduals& residuals) : model_(model), residuals_(residuals) {
+  Cost(const BodyModel& model, const BodyResiduals& residuals, std::stop_token stop)
+      : model_(model), residuals_(residuals), stop_(std::move(stop)) {
     set_num_residuals(int(residuals.parameterCount()) + 1);
     *mutable_parameter_block_sizes() = {int(model.modeCount()), 6};
     if (const int joints = 3 * model.skeleton().jointCount() - 3; joints > 0)
@@ -51,6 +52,7 @@ class Cost : public ceres::CostFunction {
   }
 
   bool Evaluate(double const* const* parameters, double* values, double** jacobians) const override {
+    if (stop_.stop_requested()) return stopped(values, jacobians);
     const BodyState state = stateOf(parameters);
     if (!state.identity.allFinite() || !state.pose.translation.allFinite() || !state.pose.rotations.allFinite())
       return false;
@@ -77,6 +79,16 @@ class Cost : public ceres::CostFunction {
   }
 
  private:
+  /// What takes no time, until the callback ends the solver: an iteration over many frames would take long. Steps are
+  /// refused; derivatives may not be, or Ceres would report a failure on stderr.
+  bool stopped(double* values, double** jacobians) const {
+    if (!jacobians) return false;
+    std::fill_n(values, num_residuals(), 0.0);
+    for (std::size_t block = 0; block < parameter_block_sizes().size(); ++block)
+      if (jacobians[block]) std::fill_n(jacobians[block], num_residuals() * parameter_block_sizes()[block], 0.0);
+    return true;
+  }
+
   BodyState stateOf(double const* const* parameters) const {
     BodyState state = model_.meanState();
     state.identity = Eigen::Map<const Eigen::VectorXd>(parameters[0], model_.modeCount());
@@ -89,6 +101,7 @@ class Cost : public ceres::CostFunction {
 
   const BodyModel& model_;
   const BodyResiduals& residuals_;
+  std::stop_token stop_;
 };
 
 /// Keeps the joints (not the root) within the limits, and moves the start there.
@@ -106,7 +119,7 @@ class FittedFrame {
  public:
   FittedFrame(const BodyModel& model, std::span<const SurfaceTarget> targets, const BodyFitOptions& options,
               const Pose& pose, double prior_share)
-      : residuals_(model, targets, options, prior_share), cost_(model, residuals_), pose_(pose) {
+      : residuals_(model, targets, options, prior_share), cost_(model, residuals_, options.stop), pose_(pose) {
     placement_ << pose.translation, pose.rotations.row(0).transpose();
   }
   FittedFrame(const FittedFrame&) = delete;
@@ -209,7 +222,9 @@ Solved<BodySequence> fitBodies(const BodyModel& model, const BodySequence& start
   StopCallback callback(options.stop);
   ceres::Solver::Summary summary;
   ceres::Solve(solverOptions(options, &callback), &problem, &summary);
-  const Outcome outcome = outcomeOf(summary);
+  Outcome outcome = outcomeOf(summary);
+  // Once the token has fired the cost tells nothing.
+  if (options.stop.stop_requested()) outcome.termination = Termination::kCancelled;
   if (outcome.termination == Termination::kNumericalFailure) return {start, outcome};
   BodySequence solution{std::move(identity), {}};
   for (const auto& frame : frames) solution.poses.push_back(frame.pose());

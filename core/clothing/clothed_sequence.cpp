@@ -63,6 +63,7 @@ void ClothedSequence::searchLimbs(BodySequence& state, std::size_t frame, const 
 
 void ClothedSequence::keepBest(BodySequence& state, std::size_t frame, std::span<const Pose> starts,
                                const ClothingTerms& terms, const Eigen::VectorXd& tightness) const {
+  if (options_.stop.stop_requested()) return;
   double least = frames_[frame].misfit(surfaceOf(state.identity, state.poses[frame]));
   for (const auto& start : starts) {
     if (options_.stop.stop_requested()) return;

@@ -54,7 +54,9 @@ std::vector<Landmark> FirstFits::landmarksOf(std::size_t frame) const {
 void FirstFits::descend(std::size_t frame, const BodyState& start) {
   ModelFitOptions fit = options_.registration.fit;
   fit.stop = options_.stop;
+  if (stopped()) return;
   const auto state = fitModelToScan(scans_[frame], model_, start, landmarksOf(frame), fit).solution.state;
+  if (stopped()) return;
   const double score = registrationScore(scans_[frame], model_, model_.posed(state).vertices());
   if (score > fits_[frame].score) fits_[frame] = {state, score};
 }
@@ -81,6 +83,7 @@ void FirstFits::fitAlone(std::size_t frame) {
     if (chosen && (start.margin >= options_.registration.doubtful_margin || stopped())) break;
     const auto fit =
         fitModelToScan(scans_[frame], model_, seated(frame, placedState(model_, motion)), landmarks, coarse).solution;
+    if (stopped()) return;
     if (!chosen || fit.report.chamfer < chosen->report.chamfer) chosen = fit;
   }
   descend(frame, chosen->state);

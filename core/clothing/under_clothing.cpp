@@ -62,10 +62,10 @@ class Estimation {
       postures.loss_scale = options_.posture_loss_scale;
       if (pass == std::min(1, options_.passes - 1)) reseat(postures, tightness);
       settlePostures(postures, tightness);
+      if (options_.stop.stop_requested()) result.termination = Termination::kCancelled;
+      if (result.termination == Termination::kCancelled) return result;  // measuring would take long
       if (pass > 0)
         tell(options_, "pass " + std::to_string(pass + 1), 0.7 + 0.3 * double(pass + 1) / double(options_.passes));
-      if (options_.stop.stop_requested()) result.termination = Termination::kCancelled;
-      if (result.termination == Termination::kCancelled) break;
     }
     result.solution.identity = state_.identity;
     result.solution.frames = measured();
@@ -97,6 +97,7 @@ class Estimation {
       const bool missed = std::find(trusted_.begin(), trusted_.end(), f) == trusted_.end();
       if (missed) sequence_.searchLimbs(state_, f, terms, tightness);
     }
+    if (options_.stop.stop_requested()) return;
     const auto frames = measured();
     trusted_.clear();
     for (std::size_t f = 0; f < frames.size(); ++f)

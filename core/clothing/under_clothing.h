@@ -85,7 +85,8 @@ struct ClothedBody {
 /// loose cloth comes out too large.
 ///
 /// scans: at least one, in the order of the motion; each may lie anywhere. landmarks: one list a frame, or none at all.
-/// The outcome is the last identity's. Throws InvalidInput naming the option, `scans[i]` or `landmarks[i][j]`.
+/// The outcome is the last identity's; a body that was cancelled has neither identity nor frames. Throws InvalidInput
+/// naming the option, `scans[i]` or `landmarks[i][j]`.
 Solved<ClothedBody> estimateUnderClothing(std::span<const Scan> scans, const BodyModel& model,
                                           std::span<const std::vector<Landmark>> landmarks,
                                           const ClothingOptions& options = {});

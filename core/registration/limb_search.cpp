@@ -150,21 +150,22 @@ class ScanSide {
 /// Turns one limb after the other.
 class Search {
  public:
-  Search(const ScanSurface& scan, const BodyModel& model, const LimbSearchOptions& options)
+  Search(const ScanSurface& scan, const BodyModel& model, const LimbSearchOptions& options, const std::stop_token& stop)
       : model_(model),
         options_(options),
+        stop_(stop),
         limbs_(model, options),
         scan_(scan, options),
         chosen_(verticesByArea(model.topology()->faces(), model.parts().mean, kDensity * options.samples)) {
     for (const auto v : chosen_) joints_.push_back(limbs_.foremostJoint(v));
   }
 
-  LimbSearch run(const BodyState& start, const std::stop_token& stop) const {
+  LimbSearch run(const BodyState& start) const {
     LimbSearch result{start};
     auto order = limbs_.all();
     if (options_.backwards) std::reverse(order.begin(), order.end());
     for (const auto& limb : order) {
-      if (stop.stop_requested()) break;
+      if (stop_.stop_requested()) break;
       result.turned += turn(limb, result.state);
     }
     return result;
@@ -260,6 +261,7 @@ class Search {
   /// Tries turns of the lower joint with one of the upper.
   void tryLower(const Limb& limb, const Cut& cut, const Eigen::Matrix3d& upper,
                 const std::vector<Eigen::Matrix3d>& lowers, double& least, Turn& best) const {
+    if (stop_.stop_requested()) return;
     const Eigen::Matrix3d world = cut.above * upper * cut.above.transpose();
     const Points moved = cut.upper.turned(world, cut.shoulder);
     const Eigen::Vector3d elbow = cut.shoulder + world * cut.bone;
@@ -296,7 +298,7 @@ class Search {
     const auto lowers = turnsOf(forearm, {45, 90}, {0});
     for (const auto& upper : turnsOf(bone, {35, 70}, {0, -50, 50})) tryLower(limb, cut, upper, lowers, least, best);
     for (const double step : {22.0, 11.0}) refine(limb, cut, bone, forearm, step, least, best);
-    if (!(least < first - options_.least_gain)) return false;
+    if (stop_.stop_requested() || !(least < first - options_.least_gain)) return false;
     state.pose.rotations.row(limb.upper) = axisAngle(best.upper).transpose();
     state.pose.rotations.row(limb.lower) = axisAngle(best.lower).transpose();
     return true;
@@ -330,6 +332,7 @@ class Search {
 
   const BodyModel& model_;
   const LimbSearchOptions& options_;
+  const std::stop_token& stop_;
   Limbs limbs_;
   ScanSide scan_;
   std::vector<std::int32_t> chosen_, joints_;  ///< sampled vertices, and the joint that carries each foremost
@@ -362,7 +365,8 @@ bool hangsBelow(const Skeleton& skeleton, std::int32_t joint, std::int32_t ances
 LimbSearch searchLimbs(const ScanSurface& scan, const BodyModel& model, const BodyState& start,
                        const LimbSearchOptions& options, const std::stop_token& stop) {
   if (const auto problem = options.firstViolation()) throw InvalidInput("limb search options", *problem);
-  return Search(scan, model, options).run(start, stop);
+  if (stop.stop_requested()) return {start};
+  return Search(scan, model, options, stop).run(start);
 }
 
 }  // namespace shaped

@@ -85,9 +85,9 @@ Solved<ModelFit> fitModelToScan(const ScanSurface& scan, const BodyModel& model,
     result.termination = outcome.termination;
     result.iterations += outcome.iterations;
     result.residual = outcome.residual;
-    const bool over = outcome.termination == Termination::kCancelled ||
-                      outcome.termination == Termination::kNumericalFailure ||
-                      outcome.termination == Termination::kStalled;
+    if (outcome.termination == Termination::kCancelled) return result;  // the report would take long
+    const bool over =
+        outcome.termination == Termination::kNumericalFailure || outcome.termination == Termination::kStalled;
     if (over) break;
   }
   result.solution.report = pairs.report(model.posed(result.solution.state).vertices(), options.levels.back());

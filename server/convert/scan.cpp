@@ -62,13 +62,14 @@ Scan scanFromProto(const v1::Scan& message, const Limits& limits, const std::str
 }
 
 std::vector<Landmark> landmarksFromProto(const google::protobuf::RepeatedPtrField<v1::ScanLandmark>& messages,
-                                         const Topology& topology, double unit_factor, const Limits& limits) {
-  requireAtMost(messages.size(), limits.markers, "landmarks", "landmarks");
+                                         const Topology& topology, double unit_factor, const Limits& limits,
+                                         const std::string& list) {
+  requireAtMost(messages.size(), limits.markers, list, "landmarks");
   std::vector<Landmark> landmarks;
   if (messages.empty()) return landmarks;
   const Corners corners(topology);
   for (const auto& message : messages) {
-    const auto field = "landmarks[" + std::to_string(landmarks.size()) + "]";
+    const auto field = list + "[" + std::to_string(landmarks.size()) + "]";
     Landmark landmark;
     if (message.has_vertex()) {
       requireIndex(message.vertex(), topology.vertexCount(), field + ".vertex");

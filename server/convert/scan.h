@@ -13,10 +13,11 @@ namespace shaped::server {
 Scan scanFromProto(const v1::Scan& message, const Limits& limits, const std::string& field = "scan");
 
 /// Places on a model, and where they are on the scan, made metres by `unit_factor`. Throws InvalidInput naming
-/// landmarks[i]: no place, one that is not of the topology, weights that are not a point of a face, or a position that
-/// is not three finite numbers.
+/// `list`[i]: no place, one that is not of the topology, weights that are not a point of a face, or a position that is
+/// not three finite numbers.
 std::vector<Landmark> landmarksFromProto(const google::protobuf::RepeatedPtrField<v1::ScanLandmark>& messages,
-                                         const Topology& topology, double unit_factor, const Limits& limits);
+                                         const Topology& topology, double unit_factor, const Limits& limits,
+                                         const std::string& list = "landmarks");
 
 /// Throws InvalidInput naming `options`.
 ScanRegistrationOptions registrationOptionsFromProto(const v1::RegistrationOptions& message, std::stop_token stop);

@@ -22,10 +22,10 @@ constexpr std::chrono::hours kLongestHeavyCall(12);
 constexpr std::size_t kWaitingJobs = 64;
 constexpr AdmissionLimits kHeavyLimits{.queue_length = 8,
                                        .bytes_in_flight = 64 << 20,
-                                       .open_streams = 1,
+                                       .open_streams = 4,
                                        .client_requests = 5,
                                        .client_bytes = 64 << 20,
-                                       .client_streams = 1};
+                                       .client_streams = 2};
 
 /// One request, one thread: parallel loops inside a solver stay in the worker's own arena of one.
 void alone(const std::function<void()>& serve) { runInArena(1, serve); }

@@ -238,6 +238,11 @@ std::vector<OptionSpec> limitOptions() {
           [](auto& o) -> auto& { return o.limits.curve_bytes; },
           "frames that a curve may hold in memory at once; the work takes about five times as much [MiB]", 1 << 20),
       countOption(
+          "max-clothing-megabytes", "N", When::kAtStart, kMostMegabytes,
+          [](auto& o) -> auto& { return o.limits.clothing_bytes; },
+          "scans that one estimate under clothing may hold in memory; the work takes about six times as much [MiB]",
+          1 << 20),
+      countOption(
           "max-upload-megabytes", "N", When::kAtStart, kMostCount,
           [](auto& o) -> auto& { return o.limits.upload_bytes; }, "largest model that an upload may bring [MiB]",
           1 << 20),

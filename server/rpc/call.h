@@ -27,7 +27,7 @@ namespace shaped::server {
 struct Runtime {
   WorkerPool& pool;   ///< solvers
   WorkerPool& light;  ///< what takes milliseconds and must work while the solvers are busy: lists, uploads, jobs
-  WorkerPool& heavy;  ///< what takes minutes and must not keep others from a solver: evaluations
+  WorkerPool& heavy;  ///< what takes minutes and must not keep others from a solver: evaluations, say
   DeadlineTimer& timer;
   Metrics& metrics;
   std::atomic<std::chrono::duration<double>>
@@ -36,6 +36,11 @@ struct Runtime {
   std::chrono::duration<double> write_patience;  ///< how long a worker waits for a client to take a message
   int threads;                                   ///< of the arena of one heavy call
   const Access* access;                          ///< knows the callers; null when nobody is asked who he is
+
+  /// On the work of a call, or of a message of a stream, in this pool.
+  std::chrono::duration<double> cap(const WorkerPool& chosen) const {
+    return &chosen == &heavy ? longest_heavy_call : longest_call.load();
+  }
 };
 
 /// What every call has, whatever its shape: an id, a place in a trace, a deadline, a stop token, one line in the log,

@@ -27,11 +27,12 @@ class UploadHandler final : public StreamHandler<v1::UploadDatasetRequest, v1::U
     return false;
   }
 
-  void end(v1::UploadDatasetResponse& response, Call&) override {
+  bool end(v1::UploadDatasetResponse& response, Call&) override {
     if (!begun()) throw InvalidInput("header", "is missing: the stream was empty");
     toProto(shapes_ ? shapes_->commit() : scans_->commit(), *response.mutable_dataset());
     shapes_.reset();
     scans_.reset();
+    return false;
   }
 
  private:

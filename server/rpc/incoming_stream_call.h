@@ -18,13 +18,15 @@ class StreamHandler {
   /// A message; comes again after it threw Waiting. True when `response` was filled and is to be sent (streams that
   /// answer every message).
   virtual bool message(const Request& request, Response& response, Call& call) = 0;
-  /// The client has sent all; fills the one response of a stream that answers at the end. Comes again after it threw
-  /// Waiting.
-  virtual void end(Response& response, Call& call) = 0;
+  /// The client has sent all. A stream with one answer fills it here. In a stream of answers: true when `response` was
+  /// filled and is to be sent, then comes again once it has been; so answers that must wait for the last message are
+  /// made one at a time. Comes again after it threw Waiting, too.
+  virtual bool end(Response& response, Call& call) = 0;
 };
 
 /// Many requests: each is read, queued for a worker, handled, perhaps answered; only then the next is read. Between
-/// messages the stream holds no worker. The server's cap counts from the latest message.
+/// messages the stream holds no worker. The server's cap counts from the latest message: how long the client may be
+/// silent, or leave an answer lying, and how long the work may take, its waiting for a worker included.
 /// Reactor: ServerBidiReactor<Request, Response>, or ServerReadReactor<Request> where `final_response` is the one
 /// answer.
 template <class Reactor, class Request, class Response>
@@ -43,7 +45,7 @@ class IncomingStreamCall final : public Reactor, public StreamCall {
 
   void read() {
     state_ = State::kReading;
-    stopAt(call().deadline(), StopReason::kDeadline);
+    awaitClient();
     this->StartRead(&request_);
   }
 
@@ -56,7 +58,10 @@ class IncomingStreamCall final : public Reactor, public StreamCall {
     queueMessage();
   }
 
-  void queueMessage() { queue(has_message_ ? request_.ByteSizeLong() : 0); }
+  void queueMessage() {
+    stopAt(call().deadline(), StopReason::kDeadline);
+    queue(has_message_ ? request_.ByteSizeLong() : 0);
+  }
 
   void work() override {
     bool answer = false;
@@ -64,18 +69,18 @@ class IncomingStreamCall final : public Reactor, public StreamCall {
     grpc::Status status;
     try {
       status = call().guarded([&] {
-        if (!has_message_) return handler_->end(response(), call());
-        requireWellFormed(request_);
-        answer = handler_->message(request_, response(), call());
+        if (has_message_) requireWellFormed(request_);
+        answer = has_message_ ? handler_->message(request_, response(), call()) : handler_->end(response(), call());
       });
     } catch (const Waiting& waiting) {
       return park(waiting);
     }
     const Lock lock(mutex_);
     if (state_ == State::kEnded) return;
-    if (!status.ok() || !has_message_) return end(status);
+    const bool sends = answer && kAnswersMany;
+    if (!status.ok() || (!has_message_ && !sends)) return end(status);
     if (call().stopped()) return endStopped();
-    answer ? write() : read();
+    sends ? write() : read();
   }
 
   /// The message, or the end, is handled again once what it waits for has come.
@@ -94,23 +99,25 @@ class IncomingStreamCall final : public Reactor, public StreamCall {
 
   void write() {
     state_ = State::kWriting;
-    if constexpr (kAnswersEach) this->StartWrite(&own_response_);
+    awaitClient();
+    if constexpr (kAnswersMany) this->StartWrite(&own_response_);
   }
 
   void onWritten(bool ok) {
     const Lock lock(mutex_);
     if (state_ == State::kEnded) return;
     if (!ok) call().stop(StopReason::kClient);
-    call().stopped() ? endStopped() : read();
+    if (call().stopped()) return endStopped();
+    has_message_ ? read() : queueMessage();
   }
 
-  Response& response() { return kAnswersEach ? own_response_ : *final_response_; }
+  Response& response() { return kAnswersMany ? own_response_ : *final_response_; }
 
   void finish(const grpc::Status& status) override { this->Finish(status); }
   void OnCancel() override { onStop(StopReason::kClient); }
   void OnDone() override { forget(); }
 
-  static constexpr bool kAnswersEach = !std::is_base_of_v<grpc::ServerReadReactor<Request>, Reactor>;
+  static constexpr bool kAnswersMany = !std::is_base_of_v<grpc::ServerReadReactor<Request>, Reactor>;
 
   Response* final_response_;
   std::unique_ptr<Handler> handler_;
@@ -122,7 +129,7 @@ class IncomingStreamCall final : public Reactor, public StreamCall {
   void OnWriteDone(bool ok) { onWritten(ok); }  // overrides in a bidi reactor only
 };
 
-/// A stream that answers every message.
+/// A stream of answers: to every message, or all at the end.
 template <class Request, class Response>
 grpc::ServerBidiReactor<Request, Response>* startBidi(Runtime& runtime, WorkerPool& pool, std::string method,
                                                       grpc::CallbackServerContext* context,

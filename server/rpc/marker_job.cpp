@@ -103,7 +103,7 @@ class TakeUpload final : public StreamHandler<v1::FitMarkersJobRequest, v1::FitM
     return false;
   }
 
-  void end(v1::FitMarkersJobResponse& response, Call&) override {
+  bool end(v1::FitMarkersJobResponse& response, Call&) override {
     if (!input_) throw InvalidInput("header", "is missing: the stream was empty");
     if (input_->count() == 0) throw InvalidInput("frame", "is missing: a take needs at least one");
     const Take take{input_->hash(), input_->count(), header_};
@@ -111,6 +111,7 @@ class TakeUpload final : public StreamHandler<v1::FitMarkersJobRequest, v1::FitM
     job.model_name = textOf(header_.setup().model());
     toProto(desk_.runner.start(std::move(job), input_.get()), *response.mutable_job());
     input_.reset();
+    return false;
   }
 
  private:

@@ -26,8 +26,9 @@ class MarkerStream final : public StreamHandler<v1::FitMarkersRequest, v1::FitMa
     return true;
   }
 
-  void end(v1::FitMarkersResponse&, Call&) override {
+  bool end(v1::FitMarkersResponse&, Call&) override {
     if (!session_) throw InvalidInput("setup", "is missing: the stream was empty");
+    return false;
   }
 
  private:

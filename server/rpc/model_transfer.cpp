@@ -45,13 +45,14 @@ class ReceiveModel final : public ModelUploadHandler {
   }
 
   /// Comes again once the model is built.
-  void end(v1::UploadModelResponse& response, Call& call) override {
+  bool end(v1::UploadModelResponse& response, Call& call) override {
     if (!incoming_ && !published_) throw InvalidInput("header", "is missing: the stream was empty");
     if (!published_) published_ = store_.publish(std::move(incoming_), call.stopToken());
     const auto model = published_->get();
     call.setModel(model->name, model->version);
     toProto(*model, *response.mutable_description());
     toProto(store_.standing(model->name, model->version), *response.mutable_description());
+    return false;
   }
 
  private:

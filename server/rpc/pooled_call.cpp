@@ -5,8 +5,7 @@ namespace shaped::server {
 PooledCall::PooledCall(Runtime& runtime, WorkerPool& pool, std::string method, grpc::CallbackServerContext& context)
     : runtime_(runtime),
       context_(context),
-      call_(runtime, context, std::move(method),
-            &pool == &runtime.heavy ? runtime.longest_heavy_call : runtime.longest_call.load()),
+      call_(runtime, context, std::move(method), runtime.cap(pool)),
       pool_(pool) {}
 
 void PooledCall::enter(std::size_t bytes) {

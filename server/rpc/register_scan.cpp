@@ -66,8 +66,9 @@ class ScanStream final : public StreamHandler<v1::RegisterSequenceRequest, v1::R
     return true;
   }
 
-  void end(v1::RegisterResponse&, Call&) override {
+  bool end(v1::RegisterResponse&, Call&) override {
     if (!served_) throw InvalidInput("setup", "is missing: the stream was empty");
+    return false;
   }
 
  private:

@@ -1,5 +1,6 @@
 #include "server/rpc/registration_service.h"
 
+#include "server/rpc/estimate_under_clothing.h"
 #include "server/rpc/register_scan.h"
 #include "server/rpc/unary_call.h"
 
@@ -17,6 +18,13 @@ grpc::ServerBidiReactor<v1::RegisterSequenceRequest, v1::RegisterResponse>* Regi
     grpc::CallbackServerContext* context) {
   return startBidi<v1::RegisterSequenceRequest, v1::RegisterResponse>(
       runtime_, runtime_.pool, "Registration.RegisterSequence", context, makeScanStream(models_, limits_));
+}
+
+grpc::ServerBidiReactor<v1::EstimateUnderClothingRequest, v1::EstimateUnderClothingResponse>*
+RegistrationService::EstimateUnderClothing(grpc::CallbackServerContext* context) {
+  return startBidi<v1::EstimateUnderClothingRequest, v1::EstimateUnderClothingResponse>(
+      runtime_, runtime_.heavy, "Registration.EstimateUnderClothing", context,
+      makeClothedStream(models_, limits_, runtime_.threads));
 }
 
 }  // namespace shaped::server

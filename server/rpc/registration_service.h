@@ -16,6 +16,8 @@ class RegistrationService final : public v1::Registration::CallbackService {
                                      v1::RegisterResponse* response) override;
   grpc::ServerBidiReactor<v1::RegisterSequenceRequest, v1::RegisterResponse>* RegisterSequence(
       grpc::CallbackServerContext* context) override;
+  grpc::ServerBidiReactor<v1::EstimateUnderClothingRequest, v1::EstimateUnderClothingResponse>* EstimateUnderClothing(
+      grpc::CallbackServerContext* context) override;
 
  private:
   Runtime& runtime_;

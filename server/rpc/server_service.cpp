@@ -19,6 +19,8 @@ void toProto(const Limits& limits, v1::Limits& message) {
   message.set_times(number(limits.times));
   message.set_job_bytes(number(limits.job_bytes));
   message.set_curve_bytes(number(limits.curve_bytes));
+  message.set_clothing_frames(number(limits.clothing_frames));
+  message.set_clothing_bytes(number(limits.clothing_bytes));
   message.set_upload_bytes(number(limits.upload_bytes));
 }
 

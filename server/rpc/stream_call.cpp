@@ -1,12 +1,14 @@
 #include "server/rpc/stream_call.h"
 
+#include <algorithm>
+
 namespace shaped::server {
 
 StreamCall::StreamCall(Runtime& runtime, WorkerPool& pool, std::string method, grpc::CallbackServerContext& context)
     : runtime_(runtime),
       pool_(pool),
       context_(context),
-      call_(runtime, context, std::move(method), runtime.longest_call) {}
+      call_(runtime, context, std::move(method), runtime.cap(pool)) {}
 
 void StreamCall::enter() {
   self_ = shared_from_this();
@@ -30,6 +32,11 @@ void StreamCall::stopAt(DeadlineTimer::Clock::time_point when, StopReason reason
   timer_ = runtime_.timer.schedule(when, [weak = weak_from_this(), reason] {
     if (const auto self = weak.lock()) self->onStop(reason);
   });
+}
+
+void StreamCall::awaitClient() {
+  const auto patience = std::chrono::duration_cast<DeadlineTimer::Clock::duration>(runtime_.longest_call.load());
+  stopAt(std::min(call_.deadline(), DeadlineTimer::Clock::now() + patience), StopReason::kDeadline);
 }
 
 void StreamCall::end(const grpc::Status& status) {

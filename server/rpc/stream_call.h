@@ -39,6 +39,8 @@ class StreamCall : public std::enable_shared_from_this<StreamCall> {
 
   /// Has a worker run work(). bytes: of the message that it works on.
   void queue(std::size_t bytes);
+  /// Stops the call when its client lets the server wait for longer than streams may be silent.
+  void awaitClient();
   /// Instead of the time that was set before.
   void stopAt(DeadlineTimer::Clock::time_point when, StopReason reason);
   void end(const grpc::Status& status);

@@ -56,6 +56,7 @@ const std::map<std::string_view, std::vector<Role>>& methods() {
       {"/shaped.v1.Curves/Join", {Role::kInfer}},
       {"/shaped.v1.Registration/Register", {Role::kInfer}},
       {"/shaped.v1.Registration/RegisterSequence", {Role::kInfer}},
+      {"/shaped.v1.Registration/EstimateUnderClothing", {Role::kInfer}},
   };
   return table;
 }

@@ -49,7 +49,8 @@ class Wire(DaemonCase):
         for kind, method, wrap in (("unary_unary", "Models/Get", one), ("unary_unary", "Jobs/Wait", one), ("unary_stream", "Jobs/Watch", one),
                                    ("unary_stream", "Shapes/Interpolate", one), ("stream_unary", "Datasets/Upload", many),
                                    ("stream_stream", "Shapes/FitMarkers", many), ("unary_unary", "Registration/Register", one),
-                                   ("stream_stream", "Registration/RegisterSequence", many)):
+                                   ("stream_stream", "Registration/RegisterSequence", many),
+                                   ("stream_stream", "Registration/EstimateUnderClothing", many)):
             with self.subTest(method), self.assertRaises(grpc.RpcError) as raised:
                 answer = getattr(self.channel, kind)("/shaped.v1." + method)(wrap(b"\xff\xff\xff"), timeout=10)
                 list(answer)  # of a stream

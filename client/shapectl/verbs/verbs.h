@@ -35,6 +35,7 @@ Verb joinVerb();
 Verb renderMotionVerb();
 Verb fitVerb();
 Verb registerVerb();
+Verb underClothingVerb();
 Verb scoreVerb();
 Verb evaluateVerb();
 Verb sampleVerb();

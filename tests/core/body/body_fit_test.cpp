@@ -149,7 +149,10 @@ TEST_CASE("a body fit says how it ended") {
   std::stop_source source;
   source.request_stop();
   options.stop = source.get_token();
-  CHECK(fitBody(model, model.meanState(), targets, options).termination == Termination::kCancelled);
+  const auto stopped = fitBody(model, model.meanState(), targets, options);
+  CHECK(stopped.termination == Termination::kCancelled);
+  CHECK(stopped.solution.identity == model.meanState().identity);  // no step was taken on a cost that tells nothing
+  CHECK(stopped.solution.pose.rotations == model.meanState().pose.rotations);
 }
 
 TEST_CASE("a body fit refuses targets that the model does not have") {

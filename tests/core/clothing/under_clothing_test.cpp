@@ -123,3 +123,22 @@ TEST_CASE("estimating under clothing refuses what it cannot read, and stops when
   options.stop = source.get_token();
   CHECK(estimateUnderClothing(tube.scans, tube.model, tube.landmarks, options).termination == Termination::kCancelled);
 }
+
+TEST_CASE("an estimate under clothing that is stopped at any stage begins no other and gives nothing") {
+  const DressedTube tube(3);
+  for (const std::string stage : {"first fit 1", "limbs of frame 1", "pass 2"}) {
+    std::stop_source source;
+    std::vector<std::string> told;
+    ClothingOptions options;
+    options.stop = source.get_token();
+    options.progress = [&](const Progress& progress) {
+      told.push_back(progress.stage);
+      if (progress.stage == stage) source.request_stop();
+    };
+    const auto found = estimateUnderClothing(tube.scans, tube.model, tube.landmarks, options);
+    INFO(stage);
+    CHECK(found.termination == Termination::kCancelled);
+    CHECK((found.solution.frames.empty() && found.solution.identity.size() == 0));
+    CHECK(told.back() == stage);
+  }
+}
