@@ -8,6 +8,12 @@
 #include "core/mesh/quality.h"
 
 namespace shaped {
+namespace {
+
+constexpr double kBent = 0.35;  ///< rad: what fingers and toes may be by the noise of their few points
+
+}  // namespace
+
 
 ClothedSequence::ClothedSequence(const std::deque<ScanSurface>& scans, const BodyModel& model,
                                  std::span<const std::vector<Landmark>> landmarks, const ClothingOptions& options)
@@ -44,6 +50,12 @@ void ClothedSequence::reseatLimbs(BodySequence& state, std::size_t frame, const 
              tightness);
 }
 
+void ClothedSequence::straightenTips(BodySequence& state, std::size_t frame, const ClothingTerms& terms,
+                                     const Eigen::VectorXd& tightness) const {
+  for (const auto& limb : limbs_)
+    keepBest(state, frame, straightenedTips(model_.skeleton(), limb, state.poses[frame], kBent), terms, tightness);
+}
+
 void ClothedSequence::searchLimbs(BodySequence& state, std::size_t frame, const ClothingTerms& terms,
                                   const Eigen::VectorXd& tightness) const {
   std::vector<Pose> starts;
@@ -69,6 +81,7 @@ void ClothedSequence::keepBest(BodySequence& state, std::size_t frame, std::span
     if (options_.stop.stop_requested()) return;
     const auto other = settled({state.identity, {start}}, {frame}, terms, tightness, {false, true}, 5);
     const double misfit = frames_[frame].misfit(surfaceOf(state.identity, other.solution.poses[0]));
+    if (std::getenv("CLOTHING_TRACE")) std::printf("frame %zu misfit %.5f -> %.5f\n", frame, least, misfit);
     if (misfit < least) least = misfit, state.poses[frame] = other.solution.poses[0];
   }
 }

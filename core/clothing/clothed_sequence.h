@@ -25,6 +25,9 @@ class ClothedSequence {
   void reseatLimbs(BodySequence& state, std::size_t frame, const std::vector<std::size_t>& neighbours,
                    const ClothingTerms& terms, const Eigen::VectorXd& tightness) const;
 
+  /// The same with hands and feet, joint by joint, as at rest (straightenedTips).
+  void straightenTips(BodySequence& state, std::size_t frame, const ClothingTerms& terms,
+                      const Eigen::VectorXd& tightness) const;
   /// The same with the limbs as a search over all their turns seats them.
   void searchLimbs(BodySequence& state, std::size_t frame, const ClothingTerms& terms,
                    const Eigen::VectorXd& tightness) const;

@@ -12,13 +12,18 @@ Eigen::Matrix3d withoutTwist(const Eigen::Matrix3d& rotation, const Eigen::Vecto
   return Eigen::Quaterniond::FromTwoVectors(bone, rotation * bone).toRotationMatrix();
 }
 
+/// Puts a joint, and all that hangs below it, at rest.
+void straighten(const Skeleton& skeleton, std::int32_t joint, Pose& pose) {
+  for (std::int32_t j = joint; j < skeleton.jointCount(); ++j)
+    if (hangsBelow(skeleton, j, joint)) pose.rotations.row(j).setZero();
+}
+
 }  // namespace
 
 std::vector<Pose> otherLimbPoses(const Skeleton& skeleton, const Vertices& rest_joints, const Limb& limb,
                                  const Pose& pose, std::span<const Pose> others) {
   std::vector<Pose> poses{pose};
-  for (std::int32_t j = limb.lower; j < skeleton.jointCount(); ++j)
-    if (hangsBelow(skeleton, j, limb.lower)) poses[0].rotations.row(j).setZero();
+  straighten(skeleton, limb.lower, poses[0]);
   poses.push_back(poses[0]);
   const Eigen::Vector3d bone = (rest_joints.row(limb.lower) - rest_joints.row(limb.upper)).transpose();
   const Eigen::Matrix3d upper = rotationMatrix(pose.rotations.row(limb.upper).transpose());
@@ -27,6 +32,16 @@ std::vector<Pose> otherLimbPoses(const Skeleton& skeleton, const Vertices& rest_
     poses.push_back(pose);
     for (std::int32_t j = limb.upper; j < skeleton.jointCount(); ++j)
       if (hangsBelow(skeleton, j, limb.upper)) poses.back().rotations.row(j) = other.rotations.row(j);
+  }
+  return poses;
+}
+
+std::vector<Pose> straightenedTips(const Skeleton& skeleton, const Limb& limb, const Pose& pose, double bent) {
+  std::vector<Pose> poses;
+  for (std::int32_t j = limb.lower + 1; j < skeleton.jointCount(); ++j) {
+    if (!hangsBelow(skeleton, j, limb.lower) || pose.rotations.row(j).norm() <= bent) continue;
+    poses.push_back(pose);
+    straighten(skeleton, j, poses.back());
   }
   return poses;
 }

@@ -61,6 +61,7 @@ class Estimation {
       ClothingTerms postures = termsOf(pass);
       postures.loss_scale = options_.posture_loss_scale;
       if (pass == std::min(1, options_.passes - 1)) reseat(postures, tightness);
+      if (pass == options_.passes - 1) straightenTips(postures, tightness);
       settlePostures(postures, tightness);
       if (options_.stop.stop_requested()) result.termination = Termination::kCancelled;
       if (result.termination == Termination::kCancelled) return result;  // measuring would take long
@@ -102,6 +103,11 @@ class Estimation {
     trusted_.clear();
     for (std::size_t f = 0; f < frames.size(); ++f)
       if (frames[f].trusted) trusted_.push_back(f);
+  }
+
+  void straightenTips(const ClothingTerms& terms, const Eigen::VectorXd& tightness) {
+    for (std::size_t f = 0; f < sequence_.size() && !options_.stop.stop_requested(); ++f)
+      sequence_.straightenTips(state_, f, terms, tightness);
   }
 
   /// The trusted frames nearest in time.
