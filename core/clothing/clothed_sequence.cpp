@@ -14,7 +14,6 @@ constexpr double kBent = 0.35;  ///< rad: what fingers and toes may be by the no
 
 }  // namespace
 
-
 ClothedSequence::ClothedSequence(const std::deque<ScanSurface>& scans, const BodyModel& model,
                                  std::span<const std::vector<Landmark>> landmarks, const ClothingOptions& options)
     : scans_(scans), model_(model), options_(options), limbs_(limbsOf(model, options.limbs)) {
@@ -81,7 +80,6 @@ void ClothedSequence::keepBest(BodySequence& state, std::size_t frame, std::span
     if (options_.stop.stop_requested()) return;
     const auto other = settled({state.identity, {start}}, {frame}, terms, tightness, {false, true}, 5);
     const double misfit = frames_[frame].misfit(surfaceOf(state.identity, other.solution.poses[0]));
-    if (std::getenv("CLOTHING_TRACE")) std::printf("frame %zu misfit %.5f -> %.5f\n", frame, least, misfit);
     if (misfit < least) least = misfit, state.poses[frame] = other.solution.poses[0];
   }
 }
