@@ -88,7 +88,8 @@ std::optional<RestPair> FieldExamples::pair(std::size_t i, const BodyModel& mode
                                             const ResidualExample& residual, const Vertices& predicted) const {
   const Vertices fitted = model.rest(state.identity);
   const ScanSurface scan(scanned(i));
-  const auto start = refitPose(model, fitted + predicted, state.pose, scan, options_.registration.fit);
+  const auto start =
+      refitPose(model, fitted + predicted, state.pose, scan, options_.registration.fit, PoseRefit::kRough);
   RestPair pair{fitted + predicted, fitted + residual.residual, scanAtRest(start.body, start.state, scan),
                 residual.subject};
   if (pair.scan.points.rows() < kFewestScanPoints) return std::nullopt;

@@ -132,7 +132,7 @@ std::optional<DeformedBody> FieldDeformation::deform(const BodyModel& model, con
   Pose pose = state.pose;
   if (regression_) {
     rest += regression_->predict(evidenceOf(state, rest, faces, seen));
-    const auto start = refitPose(model, rest, pose, scan, fit);
+    const auto start = refitPose(model, rest, pose, scan, fit, PoseRefit::kRough);
     pose = start.state.pose;
     seen = scanAtRest(start.body, start.state, scan);
     if (seen.points.rows() < kFewestScanPoints) return std::nullopt;
@@ -144,7 +144,7 @@ std::optional<DeformedBody> FieldDeformation::deform(const BodyModel& model, con
     if (!jacobians.allFinite()) return std::nullopt;
     rest = reference_->poisson->solve(jacobians, features.centroids);
   }
-  const auto body = refitPose(model, rest, pose, scan, fit);
+  const auto body = refitPose(model, rest, pose, scan, fit, PoseRefit::kFull);
   return DeformedBody{std::move(rest), body.state.pose, body.posed()};
 }
 

@@ -5,7 +5,7 @@
 namespace shaped {
 
 PosedBody refitPose(const BodyModel& model, const Vertices& rest, const Pose& near, const ScanSurface& scan,
-                    const ModelFitOptions& options) {
+                    const ModelFitOptions& options, PoseRefit how) {
   BodyParts parts = model.parts();
   parts.modes = parts.modes.leftCols(1).eval();
   parts.deviations = parts.deviations.head(1).eval();
@@ -14,7 +14,8 @@ PosedBody refitPose(const BodyModel& model, const Vertices& rest, const Pose& ne
   ModelFitOptions fit = options;
   fit.identity = false;
   while (fit.levels.size() > 2) fit.levels.erase(fit.levels.begin());
-  auto state = fitModelToScan(scan, body, {Eigen::VectorXd::Zero(1), near}, {}, fit).solution.state;
+  if (how == PoseRefit::kRough && fit.levels.size() > 1) fit.levels.pop_back();
+  auto state = fitStateToScan(scan, body, {Eigen::VectorXd::Zero(1), near}, {}, fit).solution;
   return {std::move(body), std::move(state)};
 }
 

@@ -12,9 +12,15 @@ struct PosedBody {
   Vertices posed() const { return body.posed(state).vertices(); }
 };
 
-/// A body of the model's rig that stands as it is, in a pose near by: the pose alone is fitted to the scan, by the last
-/// two levels of the options. rest: V x 3, in the model's rest pose. Throws InvalidInput naming what does not fit.
+/// How far a pose is fitted anew.
+enum class PoseRefit {
+  kRough,  ///< by the last level but one of the options: near enough to see what is where
+  kFull    ///< by the last two levels
+};
+
+/// A body of the model's rig that stands as it is, in a pose near by: the pose alone is fitted to the scan. rest: V x
+/// 3, in the model's rest pose. Throws InvalidInput naming what does not fit.
 PosedBody refitPose(const BodyModel& model, const Vertices& rest, const Pose& near, const ScanSurface& scan,
-                    const ModelFitOptions& options);
+                    const ModelFitOptions& options, PoseRefit how);
 
 }  // namespace shaped

@@ -75,22 +75,30 @@ std::optional<std::string> ModelFitOptions::firstViolation() const {
 
 Solved<ModelFit> fitModelToScan(const ScanSurface& scan, const BodyModel& model, const BodyState& start,
                                 const std::vector<Landmark>& landmarks, const ModelFitOptions& options) {
+  auto fitted = fitStateToScan(scan, model, start, landmarks, options);
+  Solved<ModelFit> result;
+  static_cast<Outcome&>(result) = fitted;
+  result.solution.state = std::move(fitted.solution);
+  if (result.termination == Termination::kCancelled) return result;  // the report would take long
+  result.solution.report =
+      ModelPairs(scan, model, options).report(model.posed(result.solution.state).vertices(), options.levels.back());
+  return result;
+}
+
+Solved<BodyState> fitStateToScan(const ScanSurface& scan, const BodyModel& model, const BodyState& start,
+                                 const std::vector<Landmark>& landmarks, const ModelFitOptions& options) {
   if (const auto problem = options.firstViolation()) throw InvalidInput("options", *problem);
   const auto pulls = landmarkTargets(landmarks, model.topology()->faces(), options.landmark_weight);
   const ModelPairs pairs(scan, model, options);
-  Solved<ModelFit> result;
-  result.solution.state = start;
+  Solved<BodyState> result;
+  result.solution = start;
   for (const auto& level : options.levels) {
-    const Outcome outcome = runLevel(pairs, model, pulls, options, level, result.solution.state);
+    const Outcome outcome = runLevel(pairs, model, pulls, options, level, result.solution);
     result.termination = outcome.termination;
     result.iterations += outcome.iterations;
     result.residual = outcome.residual;
-    if (outcome.termination == Termination::kCancelled) return result;  // the report would take long
-    const bool over =
-        outcome.termination == Termination::kNumericalFailure || outcome.termination == Termination::kStalled;
-    if (over) break;
+    if (outcome.termination != Termination::kConverged && outcome.termination != Termination::kIterationLimit) break;
   }
-  result.solution.report = pairs.report(model.posed(result.solution.state).vertices(), options.levels.back());
   return result;
 }
 

@@ -70,6 +70,10 @@ struct ModelFit {
 Solved<ModelFit> fitModelToScan(const ScanSurface& scan, const BodyModel& model, const BodyState& start,
                                 const std::vector<Landmark>& landmarks, const ModelFitOptions& options = {});
 
+/// The same without the report.
+Solved<BodyState> fitStateToScan(const ScanSurface& scan, const BodyModel& model, const BodyState& start,
+                                 const std::vector<Landmark>& landmarks, const ModelFitOptions& options = {});
+
 /// The mean body where a rigid motion carries it.
 BodyState placedState(const BodyModel& model, const RigidMotion& motion);
 /// A body moved rigidly as a whole.
