@@ -81,16 +81,17 @@ double distanceAtRest(const Vertices& shape, const Vertices& truth) {
   return 1000 * meanVertexDistance(apply(alignRigidly(shape, truth), shape), truth);
 }
 
-Measured measured(const BootstrapInputs& inputs, const BootstrapOptions& options, const Snapshot& snapshot,
-                  const std::vector<Trial>& trials) {
+BodyModel modelOf(const BootstrapInputs& inputs, const BootstrapOptions& options, const Snapshot& snapshot) {
   auto registrations = inputs.registrations;
   registrations.insert(registrations.end(), snapshot.joined.begin(), snapshot.joined.end());
   BodyTrainingOptions training;
   training.posture = options.posture;
   training.modes = options.modes;
-  const BodyModel model = trainBody(inputs.reference, registrations, training)->model;
-  ScanRegistrationOptions registration = options.registration;
-  registration.field = FieldDeformation::make(model, snapshot.field);
+  return trainBody(inputs.reference, registrations, training)->model;
+}
+
+Measured measured(const BodyModel& model, const ScanRegistrationOptions& registration,
+                  const std::vector<Trial>& trials) {
   std::vector<Measured> each(trials.size());
   const Stopwatch watch;
   tbb::parallel_for(std::size_t{0}, trials.size(), [&](std::size_t i) {
@@ -113,6 +114,31 @@ Measured measured(const BootstrapInputs& inputs, const BootstrapOptions& options
   return sum;
 }
 
+/// With the model and the field of a snapshot.
+Measured measured(const BootstrapInputs& inputs, const BootstrapOptions& options, const Snapshot& snapshot,
+                  const std::vector<Trial>& trials) {
+  const BodyModel model = modelOf(inputs, options, snapshot);
+  auto registration = options.registration;
+  registration.field = FieldDeformation::make(model, snapshot.field);
+  return measured(model, registration, trials);
+}
+
+/// What template fitting makes of the fits of the first model.
+void tellBaselines(Report& report, const BootstrapInputs& inputs, const BootstrapOptions& options,
+                   const std::vector<Trial>& trials) {
+  const BodyModel model = modelOf(inputs, options, {});
+  for (const auto& [what, method] : {std::pair{"affine fitting", FittingMethod::kAffine},
+                                     {"small displacements", FittingMethod::kDisplacement},
+                                     {"kept edge lengths", FittingMethod::kEdgeLengths}}) {
+    auto registration = options.registration;
+    registration.refine = true;
+    registration.refinement.method = method;
+    const auto found = measured(model, registration, trials);
+    report.entry(text("first model, then %s: v2v posed, mean (worst); CPU s a scan", what),
+                 text("%.2f (%.2f) mm; %.2f s", found.posed, found.worst, found.seconds));
+  }
+}
+
 void tell(Report& report, const std::string& what, const Measured& of) {
   report.entry(what + ", v2v posed: model's fit; with the field, mean (worst)",
                text("%.2f; %.2f (%.2f) mm, %.2f times", of.model_posed, of.posed, of.worst, of.posed / of.model_posed));
@@ -128,6 +154,7 @@ int setting(const char* name, int otherwise) {
 }
 
 void grow(Report& report, BootstrapInputs inputs, const BootstrapOptions& options, const std::vector<Trial>& trials) {
+  tellBaselines(report, inputs, options, trials);
   const int epochs = setting("SHAPED_EPOCHS", 20);
   std::vector<BootstrapRound> rounds;
   const auto snapshots = snapshotsOf(inputs, options, epochs, false, rounds);

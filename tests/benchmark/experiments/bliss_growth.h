@@ -24,7 +24,8 @@ BootstrapInputs growthInputs(const PostureTemplate& reference, const std::vector
 /// The paper's, over SHAPED_ROUNDS rounds; registrations stand at rest.
 BootstrapOptions growthOptions();
 
-/// Tells what the model and its field make of the trials before each round and at the end, then what a model and a
+/// Tells what template fitting makes of the first model's fits, what the model and its field make of the trials before
+/// each round and at the end, then what a model and a
 /// field of all registrations at once do.
 void grow(Report& report, BootstrapInputs inputs, const BootstrapOptions& options, const std::vector<Trial>& trials);
 
