@@ -249,6 +249,14 @@ Vertices cameraPositions(const Vertices& vertices, const VirtualScannerOptions& 
   return positions;
 }
 
+VirtualScannerOptions scannerFor(double extent) {
+  VirtualScannerOptions options;
+  for (double* length : {&options.ring_radius, &options.below, &options.above, &options.noise, &options.outlier_box,
+                         &options.hole_radius, &options.largest_shift})
+    *length *= extent / 2;
+  return options;
+}
+
 VirtualScan scanVirtually(const Vertices& vertices, const Faces& faces, const VirtualScannerOptions& options) {
   if (const auto problem = options.firstViolation()) throw InvalidInput("options", *problem);
   // A sequence for each purpose: another share of outliers leaves the surface's points and the motion as they are.

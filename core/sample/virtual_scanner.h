@@ -41,6 +41,10 @@ struct VirtualScannerOptions {
   std::optional<std::string> firstViolation() const;  ///< "points = 0, want 1 to 1000000"
 };
 
+/// The default scanner, made for a person of 2 m (the diagonal of the bounding box), for things of `extent` m: all its
+/// lengths in proportion, so that a face is scanned from half a metre with a third of a millimetre of noise.
+VirtualScannerOptions scannerFor(double extent);
+
 /// What a point of the scan saw: of an outlier nothing.
 struct ScannedPoint {
   SurfaceSample place{-1, Eigen::RowVector3d::Zero()};  ///< on the mesh; face -1 for an outlier

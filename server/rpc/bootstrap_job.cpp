@@ -128,6 +128,7 @@ class BootstrapRun {
     requireTrainer(context_.trainer);
     keepDatasets();
     const auto inputs = makeInputs();
+    options_.scanner = scannerFor(boundingBoxDiagonal(inputs.reference.rest));
     auto found = checkpoint_.find(training(), readBootstrapCheckpoint);
     run_.resumed(found ? found->stage() : "");
     if (found) tellAgain(*found);
@@ -273,7 +274,7 @@ class BootstrapRun {
   const JobContext& context_;
   const JobRun& run_;
   const v1::TrainRequest request_;
-  const BootstrapOptions options_;
+  BootstrapOptions options_;
   JobCheckpoint checkpoint_;
   Progress progress_;  ///< the last that the bootstrap told
   const Clock::time_point begin_ = Clock::now();

@@ -61,6 +61,11 @@ std::vector<Snapshot> snapshotsOf(const BootstrapInputs& inputs, const Bootstrap
     snapshots.push_back({now.joined, *now.field});
     if (first_only) stop.request_stop();
   };
+  watch.progress = [](const Progress& progress) {
+    if (progress.stage.find("held out") == std::string::npos) return;
+    std::printf("  %s\n", progress.stage.c_str());
+    std::fflush(stdout);
+  };
   watch.each_round = [&](const BootstrapRound& round) {
     rounds.push_back(round);
     std::printf("  round %d: %zu registrations, %zu scans tried, %zu joined below %.2f mm of %.2f to %.2f\n",

@@ -206,6 +206,20 @@ TEST_CASE("what stands before a surface hides it from the virtual scanner") {
   CHECK(eight.visible_fraction > one.visible_fraction);
 }
 
+TEST_CASE("a scanner for a small thing sees it as the default one sees a person") {
+  const auto scanOf = [](double size) {
+    const auto [vertices, faces] = sphere(3, size);
+    auto options = scannerFor(2 * size);
+    options.motion = RigidMotion{};
+    return scanVirtually(vertices, faces, options).scan;
+  };
+  const Scan large = scanOf(1), small = scanOf(0.125);  // an eighth: the same numbers but for their exponents
+  REQUIRE(small.points.rows() == large.points.rows());
+  CHECK((8 * small.points - large.points).cwiseAbs().maxCoeff() < 1e-6);
+  CHECK(scannerFor(2).noise == VirtualScannerOptions().noise);
+  CHECK(scannerFor(2).ring_radius == VirtualScannerOptions().ring_radius);
+}
+
 TEST_CASE("a virtual scan depends on its input and seed alone") {
   const auto mesh = sphere(3);
   VirtualScannerOptions options;
