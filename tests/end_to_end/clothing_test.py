@@ -158,7 +158,7 @@ class Clothing(DaemonCase):
         self.assertEqual(process.returncode, CANCELLED)
         begin = time.monotonic()
         self.refused("options: thickest = 0", "under-clothing", "bends", self.scans[0], "--thickest", 0)
-        self.assertLess(time.monotonic() - begin, 5)
+        self.assertLess(time.monotonic() - begin, 30)
         self.assertFalse(out.exists())
 
 

@@ -130,11 +130,12 @@ std::vector<Request> endless() {
   return messages;
 }
 
-/// The worker for long work, of which there is one, takes up the next call at once.
+/// The worker for long work, of which there is one, takes up the next call long before the last would be done, on a
+/// busy machine too.
 void requireFreeWorker() {
   const auto begin = Clock::now();
   refused({setup("nobody")}, "nobody", grpc::NOT_FOUND);
-  CHECK(Clock::now() - begin < 2s);
+  CHECK(Clock::now() - begin < 20s);
 }
 
 v1::Shape synthesized(const v1::Coefficients& coefficients) {
