@@ -66,9 +66,10 @@ struct Bootstrapped {
 /// learned once more from what there is.
 ///
 /// Ours, too: what the model's fits leave of R_DEFORM is learned by a ridge regression first (fitResiduals), and the
-/// field what that leaves, from predictions for each body by a regression without it. The targets are the registrations
-/// at rest (posture normalised, rigidly aligned to X_o), and X' joins at rest, as in the paper: limbs of a small
-/// model's fit turn to make up for what its identities lack, and the target at rest does not.
+/// field what that leaves, from predictions for each body by a regression without it. Between them goes a smooth
+/// residual (fitSmoothness), where it helps. The targets are the registrations at rest (posture normalised, rigidly
+/// aligned to X_o), and X' joins at rest, as in the paper: limbs of a small model's fit turn to make up for what its
+/// identities lack, and the target at rest does not.
 ///
 /// From ten registrations in R_DEFORM on, every fifth judges the field, which is trained on the others: one that brings
 /// these no nearer is silenced, and its round goes by the regression alone (progress says so).

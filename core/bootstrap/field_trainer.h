@@ -12,7 +12,7 @@ namespace shaped {
 
 /// A shape of the model and the registration that the field is to make of it, in the rest pose, m.
 struct RestPair {
-  Vertices source;          ///< V x 3: the model's fit to the scan, X_o, and what a regression adds to it
+  Vertices source;          ///< V x 3: the model's fit to the scan, X_o, and what regression and smoothing add to it
   Vertices target;          ///< X, V x 3
   Scan scan;                ///< carried to rest (scanAtRest)
   std::size_t example = 0;  ///< which registration of R_DEFORM it is of
