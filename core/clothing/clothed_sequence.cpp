@@ -62,9 +62,7 @@ void ClothedSequence::searchLimbs(BodySequence& state, std::size_t frame, const 
     auto search = options_.limbs;
     search.backwards = backwards;
     Pose straight = state.poses[frame];
-    for (const auto& limb : limbs_)
-      for (std::int32_t j = limb.upper; j < model_.skeleton().jointCount(); ++j)
-        if (hangsBelow(model_.skeleton(), j, limb.upper)) straight.rotations.row(j).setZero();
+    for (const auto& limb : limbs_) straighten(model_.skeleton(), limb.upper, straight);
     for (const auto& start : {state.poses[frame], straight})
       starts.push_back(
           shaped::searchLimbs(scans_[frame], model_, {state.identity, start}, search, options_.stop).state.pose);

@@ -12,13 +12,12 @@ Eigen::Matrix3d withoutTwist(const Eigen::Matrix3d& rotation, const Eigen::Vecto
   return Eigen::Quaterniond::FromTwoVectors(bone, rotation * bone).toRotationMatrix();
 }
 
-/// Puts a joint, and all that hangs below it, at rest.
+}  // namespace
+
 void straighten(const Skeleton& skeleton, std::int32_t joint, Pose& pose) {
   for (std::int32_t j = joint; j < skeleton.jointCount(); ++j)
     if (hangsBelow(skeleton, j, joint)) pose.rotations.row(j).setZero();
 }
-
-}  // namespace
 
 std::vector<Pose> otherLimbPoses(const Skeleton& skeleton, const Vertices& rest_joints, const Limb& limb,
                                  const Pose& pose, std::span<const Pose> others) {

@@ -78,11 +78,11 @@ struct ClothedBody {
 /// Postures with the identity held and the identity with the postures held, in turn, the cloth's weight rising and the
 /// data's loss narrowing from pass to pass.
 ///
-/// Ours: first postures come from fits of each scan by itself (FirstFits), then limb by limb also from frames nearby.
-/// And the data of a point inside counts by how little its gap varies over the frames: naked skin keeps its distance,
-/// cloth comes and goes. So head, hands and feet tell who it is, cloth only where the body must not be, and in between
-/// the identity prior decides. That takes three frames or more; with fewer all points count alike, and the body under
-/// loose cloth comes out too large.
+/// Ours: first postures come from fits of each scan by itself (FirstFits), then limb by limb also from frames nearby,
+/// at last with folded fingers and toes straight. And the data of a point inside counts by how little its gap varies
+/// over the frames: naked skin keeps its distance, cloth comes and goes. So head, hands and feet tell who it is, cloth
+/// only where the body must not be, and in between the identity prior decides. That takes three frames or more; with
+/// fewer all points count alike, and the body under loose cloth comes out too large.
 ///
 /// scans: at least one, in the order of the motion; each may lie anywhere. landmarks: one list a frame, or none at all.
 /// The outcome is the last identity's; a body that was cancelled has neither identity nor frames. Throws InvalidInput

@@ -79,9 +79,7 @@ TEST_CASE("a smooth residual is the posterior mean that the kernel form of the p
   CHECK(maxVertexDistance(found, expected) < 1e-9);
 }
 
-TEST_CASE("displacements have variance one on the mean before anything is seen") {
-  // What one exact offset alone moves its own vertex by, along the normal, is that offset, whatever the reach; its
-  // neighbours follow the further the longer the reach is.
+TEST_CASE("one exact offset moves its own vertex by itself, and the others the further the longer the reach is") {
   const Sphere sphere;
   double last = 0;
   for (const double reach : {0.05, 0.2, 0.8}) {
