@@ -56,7 +56,7 @@ class BodyModel {
   PosedSkin posed(const BodyState& state) const;
 
   /// How the rest position of a vertex follows the identity, 3 x k: the rows of A times the deviations.
-  Eigen::Matrix3Xd vertexModes(Eigen::Index vertex) const { return scaled_modes_.middleRows<3>(3 * vertex); }
+  PosedSkin::VertexModes vertexModes(Eigen::Index vertex) const { return scaled_modes_.middleRows<3>(3 * vertex); }
   /// The same for the rest joints, 3 J x k, joint by joint.
   const Eigen::MatrixXd& jointModes() const { return joint_modes_; }
 
@@ -68,7 +68,8 @@ class BodyModel {
 
  private:
   BodyParts parts_;
-  Eigen::MatrixXd scaled_modes_, joint_modes_;
+  Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor> scaled_modes_;  ///< a vertex in one place
+  Eigen::MatrixXd joint_modes_;
   Vertices mean_joints_;
 };
 

@@ -11,38 +11,42 @@ class BodyResiduals::TargetRows {
       : residuals_(residuals),
         skin_(residuals.model_.posed(state)),
         bones_(skin_.boneDerivatives(residuals.model_.jointModes())),
-        levers_(3, residuals.model_.skeleton().jointCount()),
-        shape_(3, residuals.model_.modeCount()) {}
+        levers_(3, residuals.model_.skeleton().jointCount()) {}
 
   /// Fills residuals_.rowCount(target) rows.
   void fill(const SurfaceTarget& target, Eigen::Ref<Rows> rows) {
     Eigen::Vector3d offset = -target.position;
     levers_.setZero();
-    shape_.setZero();
-    for (int c = 0; c < 3; ++c)
-      if (target.barycentric[c] != 0) addCorner(target.corners[std::size_t(c)], target.barycentric[c], offset);
+    forCorners(target, [&](std::int32_t corner, double share) {
+      offset += share * skin_.vertices().row(corner).transpose();
+      skin_.addLevers(corner, share, levers_);
+    });
     const double scale = residuals_.scale_ * std::sqrt(target.weight);
+    const Eigen::Index modes = residuals_.model_.modeCount(), last = rows.cols() - 1;
     for (Eigen::Index row = 0; row < rows.rows(); ++row) {
       const bool along = rows.rows() == 1;
       const Eigen::Vector3d direction = scale * (along ? target.normal : Eigen::Vector3d(Eigen::Vector3d::Unit(row)));
-      const Eigen::Index modes = shape_.cols(), last = rows.cols() - 1;
-      rows.row(row).head(modes) = direction.transpose() * shape_;
+      auto shape = rows.row(row).head(modes);
+      shape.setZero();
+      forCorners(target, [&](std::int32_t corner, double share) {
+        skin_.addShapeRow(corner, share, direction, residuals_.model_.vertexModes(corner), bones_, shape);
+      });
       skin_.poseRow(levers_, direction, rows.row(row).segment(modes, last - modes));
       rows(row, last) = direction.dot(offset);
     }
   }
 
  private:
-  void addCorner(std::int32_t corner, double share, Eigen::Vector3d& offset) {
-    offset += share * skin_.vertices().row(corner).transpose();
-    skin_.addLevers(corner, share, levers_);
-    shape_ += share * skin_.shapeDerivative(corner, residuals_.model_.vertexModes(corner), bones_);
+  template <class Work>
+  static void forCorners(const SurfaceTarget& target, const Work& work) {
+    for (int c = 0; c < 3; ++c)
+      if (target.barycentric[c] != 0) work(target.corners[std::size_t(c)], target.barycentric[c]);
   }
 
   const BodyResiduals& residuals_;
   PosedSkin skin_;
   std::vector<Eigen::Matrix3Xd> bones_;
-  Eigen::Matrix3Xd levers_, shape_;
+  Eigen::Matrix3Xd levers_;
 };
 
 BodyResiduals::BodyResiduals(const BodyModel& model, std::span<const SurfaceTarget> targets,

@@ -33,9 +33,9 @@ void requireInputs(const BootstrapInputs& inputs, const FieldTrainer& train, con
 }
 
 void requireSameKind(const BootstrapCheckpoint& checkpoint, const BootstrapInputs& inputs,
-                     const BootstrapOptions& options) {
+                     const FieldExamples& field_examples) {
   const auto examples = checkpoint.examples.size();
-  bool fits = examples == 0 || examples == exampleScans(inputs, options);
+  bool fits = examples == 0 || examples == field_examples.count(checkpoint.rounds.size());
   for (const auto& scan : checkpoint.scans) fits = fits && scan.report.scan < inputs.scans.count;
   for (const auto& shape : checkpoint.joined) fits = fits && shape.rows() == inputs.reference.rest.rows();
   if (!fits) throw InvalidInput("checkpoint", "is of other inputs; begin anew");
@@ -57,10 +57,10 @@ class Bootstrap {
         options_(options),
         watch_(watch),
         examples_(inputs, options),
-        state_(std::move(state)),
-        registrations_(inputs.registrations) {
-    registrations_.insert(registrations_.end(), state_.joined.begin(), state_.joined.end());
-    state_.examples.resize(examples_.count());
+        state_(std::move(state)) {
+    requireSameKind(state_, inputs, examples_);
+    registrations_ = modelRegistrations(inputs_, options_, state_.rounds.size(), state_.joined);
+    state_.examples.resize(exampleCount());
   }
 
   std::optional<Bootstrapped> run() {
@@ -147,7 +147,7 @@ class Bootstrap {
   }
 
   bool fitExamples(const BodyModel& model) {
-    forAll(examples_.count(), [&](std::size_t i) {
+    forAll(exampleCount(), [&](std::size_t i) {
       if (state_.examples[i]) return;
       auto fitted = examples_.fit(i, model, watch_.stop);
       if (!fitted) return;
@@ -155,7 +155,7 @@ class Bootstrap {
         state_.examples[i] = std::move(fitted);
         const auto done = std::count_if(state_.examples.begin(), state_.examples.end(),
                                         [](const auto& example) { return example.has_value(); });
-        tellOf("fitting the field's scans, ", done, examples_.count(), 0, kFieldBegins);
+        tellOf("fitting the field's scans, ", done, exampleCount(), 0, kFieldBegins);
       });
     });
     return !stopped();
@@ -163,7 +163,7 @@ class Bootstrap {
 
   /// Of the scans that were fitted and show enough, in their order.
   std::vector<TaughtResidual> residualsOf(const BodyModel& model) const {
-    std::vector<std::optional<ResidualExample>> found(examples_.count());
+    std::vector<std::optional<ResidualExample>> found(exampleCount());
     forAll(found.size(), [&](std::size_t i) {
       if (taught(i)) found[i] = examples_.residual(i, model, *state_.examples[i]);
     });
@@ -264,7 +264,7 @@ class Bootstrap {
     round.round = roundNumber();
     round.registrations = registrations_.size();
     std::set<std::size_t> examples;
-    for (std::size_t i = 0; i < examples_.count(); ++i)
+    for (std::size_t i = 0; i < exampleCount(); ++i)
       if (taught(i)) examples.insert(examples_.example(i));
     round.examples = examples.size();
     for (const auto& fitted : state_.scans) round.scans.push_back(fitted.report);
@@ -280,16 +280,19 @@ class Bootstrap {
   }
 
   void grow(BootstrapRound round, const std::vector<Vertices>& surfaces) {
-    for (auto* shapes : {&state_.joined, &registrations_})
-      shapes->insert(shapes->end(), surfaces.begin(), surfaces.end());
+    state_.joined.insert(state_.joined.end(), surfaces.begin(), surfaces.end());
     state_.scans.clear();
-    if (!surfaces.empty()) {  // else model and field are what they would become
-      state_.field.reset();
-      std::fill(state_.examples.begin(), state_.examples.end(), std::nullopt);
-    }
     state_.rounds.push_back(std::move(round));
+    auto registrations = modelRegistrations(inputs_, options_, state_.rounds.size(), state_.joined);
+    if (registrations.size() > registrations_.size()) {  // else model and field are what they would become
+      registrations_ = std::move(registrations);
+      state_.field.reset();
+      state_.examples.assign(exampleCount(), std::nullopt);
+    }
     if (watch_.each_round) watch_.each_round(state_.rounds.back());
   }
+
+  std::size_t exampleCount() const { return examples_.count(state_.rounds.size()); }
 
   int roundNumber() const { return static_cast<int>(state_.rounds.size()) + 1; }
 
@@ -344,11 +347,19 @@ class Bootstrap {
 
 }  // namespace
 
+std::vector<Vertices> modelRegistrations(const BootstrapInputs& inputs, const BootstrapOptions& options,
+                                         std::size_t rounds, const std::vector<Vertices>& joined) {
+  auto registrations = inputs.registrations;
+  if (options.share_registrations && rounds > 0)
+    for (const auto& example : inputs.examples) registrations.push_back(example.registration);
+  registrations.insert(registrations.end(), joined.begin(), joined.end());
+  return registrations;
+}
+
 std::optional<Bootstrapped> bootstrapBody(const BootstrapInputs& inputs, const FieldTrainer& train,
                                           const BootstrapOptions& options, const BootstrapWatch& watch,
                                           std::optional<BootstrapCheckpoint> resumed) {
   requireInputs(inputs, train, options);
-  if (resumed) requireSameKind(*resumed, inputs, options);
   return Bootstrap(inputs, train, options, watch, resumed ? std::move(*resumed) : BootstrapCheckpoint{}).run();
 }
 

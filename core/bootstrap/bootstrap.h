@@ -58,12 +58,18 @@ struct Bootstrapped {
   BootstrapEnd end;
 };
 
+/// R_PCA after that many rounds: what the model began with, then, where registrations are shared, R_DEFORM, then what
+/// joined. A field belongs to the model that is learned of them in this order.
+std::vector<Vertices> modelRegistrations(const BootstrapInputs& inputs, const BootstrapOptions& options,
+                                         std::size_t rounds, const std::vector<Vertices>& joined);
+
 /// BLiSS ([Mur25] section 3.3, Algorithm 2). Each round learns a model from R_PCA, fits it to the scans of R_DEFORM and
 /// trains a field to make their registrations of the fits, registers the unregistered scans with both, and moves those
 /// to R_PCA whose chamfer distance (both ways, posed surface and scan) is at most the smallest plus `acceptance`
 /// standard deviations. Ours: a fit that failed or scores below registration.least_score is not compared and never
 /// joins. It ends when fewer than least_joined join, no scan is left, or the rounds are done; model and field are then
-/// learned once more from what there is.
+/// learned once more from what there is. Before the first round R_PCA and R_DEFORM are apart, later all of both teaches
+/// both (share_registrations).
 ///
 /// Ours, too: what the model's fits leave of R_DEFORM is learned by a ridge regression first (fitResiduals), and the
 /// field what that leaves, from predictions for each body by a regression without it. Between them goes a smooth

@@ -9,35 +9,44 @@
 #include "core/skeleton/skinning.h"
 
 namespace shaped {
-namespace {
-
-std::string fieldOf(std::size_t i, const char* part) { return "examples[" + std::to_string(i) + "]." + part; }
-
-}  // namespace
-
-std::size_t exampleScans(const BootstrapInputs& inputs, const BootstrapOptions& options) {
-  std::size_t count = 0;
-  for (const auto& example : inputs.examples) count += example.scan ? 1 : std::size_t(options.virtual_scans);
-  return count;
-}
-
 FieldExamples::FieldExamples(const BootstrapInputs& inputs, const BootstrapOptions& options)
     : inputs_(inputs), options_(options) {
   if (inputs.examples.empty()) throw InvalidInput("examples", "are none; the field is trained on one at least");
+  const auto virtual_scans = static_cast<std::size_t>(options.virtual_scans);
   for (std::size_t i = 0; i < inputs.examples.size(); ++i) {
     const auto& [registration, scan] = inputs.examples[i];
-    requireValidShape(*inputs.reference.topology, registration, fieldOf(i, "registration"));
-    if (scan) requireUsableScan(*scan, fieldOf(i, "scan"));
-    for (std::size_t number = 0; number < (scan ? 1 : std::size_t(options.virtual_scans)); ++number)
-      scans_.push_back({i, number});
+    requireValidShape(*inputs.reference.topology, registration, nameOf(i));
+    if (scan) requireUsableScan(*scan, "examples[" + std::to_string(i) + "].scan");
+    for (std::size_t number = 0; number < (scan ? 1 : virtual_scans); ++number) scans_.push_back({i, number});
   }
+  own_ = scans_.size();
+  if (!options.share_registrations) return;
+  for (std::size_t i = 0; i < inputs.registrations.size(); ++i)
+    for (std::size_t number = 0; number < virtual_scans; ++number)
+      scans_.push_back({inputs.examples.size() + i, number});
+}
+
+std::size_t FieldExamples::count(std::size_t rounds) const { return rounds == 0 ? own_ : scans_.size(); }
+
+const Vertices& FieldExamples::registration(std::size_t example) const {
+  const auto own = inputs_.examples.size();
+  return example < own ? inputs_.examples[example].registration : inputs_.registrations[example - own];
+}
+
+std::string FieldExamples::nameOf(std::size_t example) const {
+  const auto own = inputs_.examples.size();
+  return example < own ? "examples[" + std::to_string(example) + "].registration"
+                       : "registrations[" + std::to_string(example - own) + "]";
+}
+
+Vertices FieldExamples::atRest(std::size_t example) const {
+  return normalisedPosture(inputs_.reference, registration(example), options_.posture, options_.reach);
 }
 
 /// The registration in a posture near rest.
 Vertices FieldExamples::posed(std::size_t example, std::uint64_t seed) const {
   const auto& reference = inputs_.reference;
-  const Vertices rest =
-      normalisedPosture(reference, inputs_.examples[example].registration, options_.posture, options_.reach);
+  const Vertices rest = atRest(example);
   Random random(seed);
   Pose pose = restPose(reference.rig.skeleton);
   for (Eigen::Index joint = 1; joint < pose.rotations.rows(); ++joint)
@@ -47,7 +56,8 @@ Vertices FieldExamples::posed(std::size_t example, std::uint64_t seed) const {
 
 Scan FieldExamples::scanned(std::size_t i) const {
   const auto [example, number] = scans_[i];
-  if (const auto& scan = inputs_.examples[example].scan) return preparedScan(*scan, options_.registration.unit_factor);
+  if (i < own_ && inputs_.examples[example].scan)
+    return preparedScan(*inputs_.examples[example].scan, options_.registration.unit_factor);
   Random random(options_.seed + i);
   auto scanner = options_.scanner;
   scanner.seed = random.bits();
@@ -55,7 +65,7 @@ Scan FieldExamples::scanned(std::size_t i) const {
     return preparedScan(scanVirtually(posed(example, random.bits()), inputs_.reference.topology->faces(), scanner).scan,
                         1);
   } catch (const InvalidInput& problem) {
-    throw InvalidInput(fieldOf(example, "registration"), std::string("cannot be scanned: ") + problem.what());
+    throw InvalidInput(nameOf(example), std::string("cannot be scanned: ") + problem.what());
   }
 }
 
@@ -78,8 +88,7 @@ std::optional<ResidualExample> FieldExamples::residual(std::size_t i, const Body
   const Scan seen = scanAtRest(model, state, ScanSurface(scanned(i)));
   if (seen.points.rows() < kFewestScanPoints) return std::nullopt;
   const Vertices fitted = model.rest(state.identity);
-  const Vertices normalised =
-      normalisedPosture(inputs_.reference, inputs_.examples[example].registration, options_.posture, options_.reach);
+  const Vertices normalised = atRest(example);
   const Vertices target = apply(alignRigidly(normalised, fitted), normalised);
   return ResidualExample{evidenceOf(state, fitted, model.topology()->faces(), seen), target - fitted, example};
 }

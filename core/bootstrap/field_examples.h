@@ -1,5 +1,6 @@
 #pragma once
 
+#include <string>
 #include <vector>
 
 #include "core/bootstrap/bootstrap.h"
@@ -7,14 +8,15 @@
 namespace shaped {
 
 /// The registrations that teach the field, with their scans: one each where it is given, else
-/// BootstrapOptions::virtual_scans of them.
+/// BootstrapOptions::virtual_scans of them. First those of R_DEFORM, then those that the model began with, which teach
+/// once registrations are shared.
 class FieldExamples {
  public:
   /// All must outlive it. Throws InvalidInput naming `examples`, or the registration or scan that is no good.
   FieldExamples(const BootstrapInputs& inputs, const BootstrapOptions& options);
 
-  /// Scans of all registrations.
-  std::size_t count() const { return scans_.size(); }
+  /// Scans of all registrations that teach after that many rounds.
+  std::size_t count(std::size_t rounds) const;
   /// The registration that scan i is of.
   std::size_t example(std::size_t i) const { return scans_[i].example; }
 
@@ -30,7 +32,10 @@ class FieldExamples {
                                const ResidualExample& residual, const Vertices& predicted) const;
 
  private:
+  const Vertices& registration(std::size_t example) const;
+  std::string nameOf(std::size_t example) const;
   Scan scanned(std::size_t i) const;
+  Vertices atRest(std::size_t example) const;
   Vertices posed(std::size_t example, std::uint64_t seed) const;
 
   /// Which registration a scan is of, and the number of its virtual scan.
@@ -41,9 +46,7 @@ class FieldExamples {
   const BootstrapInputs& inputs_;
   const BootstrapOptions& options_;
   std::vector<Source> scans_;
+  std::size_t own_ = 0;  ///< scans of R_DEFORM
 };
-
-/// Scans of all registrations, as FieldExamples::count().
-std::size_t exampleScans(const BootstrapInputs& inputs, const BootstrapOptions& options);
 
 }  // namespace shaped

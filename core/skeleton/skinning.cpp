@@ -109,12 +109,16 @@ std::vector<Eigen::Matrix3Xd> PosedSkin::boneDerivatives(const Eigen::MatrixXd& 
   return bones;
 }
 
-Eigen::Matrix3Xd PosedSkin::shapeDerivative(Eigen::Index vertex, const Eigen::Ref<const Eigen::Matrix3Xd>& vertex_modes,
-                                            const std::vector<Eigen::Matrix3Xd>& bones) const {
-  Eigen::Matrix3Xd derivative = blend(vertex) * vertex_modes;
-  for (SkinWeights::InnerIterator entry(weights_, vertex); entry; ++entry)
-    derivative += entry.value() * bones[std::size_t(entry.col())];
-  return derivative;
+void PosedSkin::addShapeRow(Eigen::Index vertex, double share, const Eigen::Vector3d& direction,
+                            const VertexModes& vertex_modes, const std::vector<Eigen::Matrix3Xd>& bones,
+                            Eigen::Ref<Eigen::RowVectorXd> row) const {
+  Eigen::Vector3d at_rest = Eigen::Vector3d::Zero();  // T_i^T direction
+  for (SkinWeights::InnerIterator entry(weights_, vertex); entry; ++entry) {
+    const Eigen::Vector3d pull = share * entry.value() * direction;
+    at_rest.noalias() += bones_.rotations[std::size_t(entry.col())].transpose() * pull;
+    row.noalias() += pull.transpose() * bones[std::size_t(entry.col())];
+  }
+  for (int axis = 0; axis < 3; ++axis) row += at_rest[axis] * vertex_modes.row(axis);
 }
 
 Vertices skinned(const Rig& rig, const Vertices& rest, const Pose& pose) {

@@ -42,10 +42,14 @@ class PosedSkin {
   /// joint), what each bone's translation p_j - G_j r_j changes by, J matrices of 3 x k.
   std::vector<Eigen::Matrix3Xd> boneDerivatives(const Eigen::MatrixXd& joint_modes) const;
 
-  /// d x_i / d shape, 3 x k: T_i vertex_modes + sum_j w_ij bones_j. vertex_modes: 3 x k, how v_i changes; bones: from
-  /// boneDerivatives.
-  Eigen::Matrix3Xd shapeDerivative(Eigen::Index vertex, const Eigen::Ref<const Eigen::Matrix3Xd>& vertex_modes,
-                                   const std::vector<Eigen::Matrix3Xd>& bones) const;
+  /// How a vertex at rest follows the shape: 3 x k, rows of modes that lie one after the other in memory.
+  using VertexModes =
+      Eigen::Ref<const Eigen::Matrix<double, 3, Eigen::Dynamic, Eigen::RowMajor>, 0, Eigen::OuterStride<>>;
+
+  /// Adds share times d (direction . x_i) / d shape to `row`, k numbers: direction^T (T_i vertex_modes + sum_j w_ij
+  /// bones_j). bones: from boneDerivatives.
+  void addShapeRow(Eigen::Index vertex, double share, const Eigen::Vector3d& direction, const VertexModes& vertex_modes,
+                   const std::vector<Eigen::Matrix3Xd>& bones, Eigen::Ref<Eigen::RowVectorXd> row) const;
 
  private:
   Eigen::Vector3d carried(Eigen::Index vertex, Eigen::Index joint) const;

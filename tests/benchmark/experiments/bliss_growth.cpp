@@ -43,6 +43,7 @@ FieldTrainer trainerOf(int epochs) {
 
 /// What a bootstrap had learned at some time.
 struct Snapshot {
+  std::size_t rounds = 0;
   std::vector<Vertices> joined;
   JacobianFieldWeights field;
 };
@@ -58,7 +59,7 @@ std::vector<Snapshot> snapshotsOf(const BootstrapInputs& inputs, const Bootstrap
     const auto now = state();
     if (now.trainings == seen || !now.field) return;
     seen = now.trainings;
-    snapshots.push_back({now.joined, *now.field});
+    snapshots.push_back({now.rounds.size(), now.joined, *now.field});
     if (first_only) stop.request_stop();
   };
   watch.progress = [](const Progress& progress) {
@@ -87,11 +88,10 @@ double distanceAtRest(const Vertices& shape, const Vertices& truth) {
 }
 
 BodyModel modelOf(const BootstrapInputs& inputs, const BootstrapOptions& options, const Snapshot& snapshot) {
-  auto registrations = inputs.registrations;
-  registrations.insert(registrations.end(), snapshot.joined.begin(), snapshot.joined.end());
   BodyTrainingOptions training;
   training.posture = options.posture;
   training.modes = options.modes;
+  const auto registrations = modelRegistrations(inputs, options, snapshot.rounds, snapshot.joined);
   return trainBody(inputs.reference, registrations, training)->model;
 }
 
@@ -165,7 +165,8 @@ void grow(Report& report, BootstrapInputs inputs, const BootstrapOptions& option
   const auto snapshots = snapshotsOf(inputs, options, epochs, false, rounds);
   for (std::size_t s = 0; s < snapshots.size(); ++s)
     tell(report,
-         text("after %zu rounds, %zu registrations", s, inputs.registrations.size() + snapshots[s].joined.size()),
+         text("after %zu rounds, %zu registrations", snapshots[s].rounds,
+              modelRegistrations(inputs, options, snapshots[s].rounds, snapshots[s].joined).size()),
          measured(inputs, options, snapshots[s], trials));
   for (std::size_t i = 0, count = inputs.registrations.size(); i < count; ++i)
     inputs.examples.push_back({inputs.registrations[i], std::nullopt});
@@ -193,6 +194,7 @@ BootstrapOptions growthOptions() {
   BootstrapOptions options;
   options.posture = PostureNormalisation::kNone;
   options.rounds = setting("SHAPED_ROUNDS", 3);
+  options.share_registrations = setting("SHAPED_SHARED", 1) != 0;
   return options;
 }
 
