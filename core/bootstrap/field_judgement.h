@@ -14,7 +14,8 @@ std::vector<RestPair> takeJudges(std::vector<RestPair>& pairs);
 struct FieldJudgement {
   double before = 0, after = 0;  ///< mean distance of corresponding vertices of source and target, of X' and target, m
 
-  bool helps() const { return after < before; }
+  /// By a hundredth at least: less is not worth the time that evaluating it takes.
+  bool helps() const { return after < 0.99 * before; }
 };
 
 /// judges: at least one pair. `after` is infinite where the field overflows on one. Throws as jacobianFieldFeatures

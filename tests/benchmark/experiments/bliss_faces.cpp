@@ -1,5 +1,6 @@
 #include "core/io/frames.h"
 #include "core/io/mesh_file.h"
+#include "core/mesh/quality.h"
 #include "core/sample/random.h"
 #include "core/sample/virtual_scanner.h"
 #include "tests/benchmark/experiments/bliss_growth.h"
@@ -41,18 +42,6 @@ class Persons {
   std::vector<Vertices> modes_;
 };
 
-/// A scanner of faces: as that of bodies, seven times as small and near.
-VirtualScannerOptions faceScanner() {
-  VirtualScannerOptions scanner;
-  scanner.ring_radius = 0.5;
-  scanner.below = scanner.above = 0.1;
-  scanner.noise = 0.0003;
-  scanner.outlier_box = 0.02;
-  scanner.hole_radius = 0.012;
-  scanner.largest_shift = 0.2;
-  return scanner;
-}
-
 }  // namespace
 
 void blissFaces() {
@@ -64,7 +53,16 @@ void blissFaces() {
   const Persons persons(neutral);
   Random random(29);
   auto options = growthOptions();
-  options.scanner = faceScanner();
+  options.scanner = scannerFor(boundingBoxDiagonal(neutral));
+  if (setting("SHAPED_SCALED", 0)) {
+    const double factor = boundingBoxDiagonal(neutral) / 2;
+    for (auto& level : options.registration.fit.levels) {
+      level.max_distance *= factor;
+      level.loss_scale *= factor;
+      level.sigma *= factor;
+    }
+    options.registration.fit.tolerance *= factor;
+  }
   std::vector<Vertices> known;
   for (int i = 0; i < 20; ++i) known.push_back(persons.draw(random));
   const auto scanned = [&](const Vertices& face) {

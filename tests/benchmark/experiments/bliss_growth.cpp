@@ -194,6 +194,7 @@ BootstrapOptions growthOptions() {
   BootstrapOptions options;
   options.posture = PostureNormalisation::kNone;
   options.rounds = setting("SHAPED_ROUNDS", 3);
+  options.acceptance = setting("SHAPED_ACCEPTANCE", 1);
   options.share_registrations = setting("SHAPED_SHARED", 1) != 0;
   return options;
 }

@@ -91,7 +91,7 @@ TEST_CASE("a bootstrap grows its model by the scans that its registrations lie n
   std::set<std::size_t> joined;
   for (const auto& round : rounds) {
     CHECK(round.registrations == registrations);
-    CHECK(round.examples == 2);
+    CHECK(round.examples == (round.round == 1 ? 2 : 2 + set.inputs.registrations.size()));
     CHECK(round.joined >= 1);
     CHECK(round.scans.size() == set.inputs.scans.count - joined.size());
     for (const auto& scan : round.scans) {
@@ -100,13 +100,13 @@ TEST_CASE("a bootstrap grows its model by the scans that its registrations lie n
       CHECK(scan.score > 0.9);
       if (scan.verdict == ScanVerdict::kJoined) CHECK(joined.insert(scan.scan).second);
     }
-    registrations += round.joined;
+    registrations += round.joined + (round.round == 1 ? 2 : 0);  // from then on the field's serve the model too
     tried += round.scans.size();
   }
   CHECK(scans.size() == tried);
   for (const auto& scan : scans) CHECK(scan.verdict == ScanVerdict::kPending);
   REQUIRE(grown->joined.size() == joined.size());
-  CHECK(grown->variances.size() >= std::ssize(set.inputs.registrations) - 1 + std::ssize(joined));
+  CHECK(grown->variances.size() >= std::ssize(set.inputs.registrations) - 1 + 2 + std::ssize(joined));
   CHECK(grown->model.modeCount() == 3);
 
   CHECK(progress.front().fraction == 0);
@@ -141,12 +141,39 @@ TEST_CASE("what joins is the surface at rest, and posed lies on the body that wa
   CHECK(at == sharedRun().rounds.front().joined);
 }
 
+TEST_CASE("registrations of model and field stay apart in the first round, and to the end where they are not shared") {
+  auto set = sharedSet();
+  set.options.share_registrations = false;
+  std::vector<std::size_t> taught;
+  const FieldTrainer counting = [&](const FieldTrainingSet& training, const std::stop_token& stop) {
+    taught.push_back(training.pairs.size());
+    return trainPullField(training, stop);
+  };
+  const auto apart = bootstrapBody(set.inputs, counting, set.options);
+  REQUIRE(apart);
+  CHECK(taught == std::vector<std::size_t>(apart->rounds.size() + 1, 2));
+  const auto& shared = *sharedRun().grown;
+  CHECK(apart->rounds[0].accepted_below == shared.rounds[0].accepted_below);
+  CHECK(apart->rounds[0].registrations == set.inputs.registrations.size());
+  CHECK(apart->variances.size() < shared.variances.size());
+
+  const std::vector<Vertices> joined{shared.joined[0]};
+  const auto& [reference, registrations, examples, scans] = set.inputs;
+  CHECK(modelRegistrations(set.inputs, sharedSet().options, 0, {}) == registrations);
+  auto all = registrations;
+  all.push_back(joined[0]);
+  CHECK(modelRegistrations(set.inputs, set.options, 1, joined) == all);
+  for (std::size_t i = 0; i < examples.size(); ++i) all.insert(all.end() - 1, examples[i].registration);
+  CHECK(modelRegistrations(set.inputs, sharedSet().options, 1, joined) == all);
+}
+
 TEST_CASE("a bootstrap resumed from any checkpoint gives the same bits") {
   const auto& set = sharedSet();
   const auto& [grown, states, progress, scans, rounds] = sharedRun();
   REQUIRE(grown);
   // After each example, field, scan and round.
-  CHECK(states.size() == (rounds.size() + 1) * (2 + 1) + scans.size() + rounds.size());
+  const auto all = 2 + set.inputs.registrations.size();
+  CHECK(states.size() == 2 + 1 + rounds.size() * (all + 1) + scans.size() + rounds.size());
   std::size_t untold = scans.size();
   for (std::size_t i = 0; i < states.size(); ++i) {
     if (i < states.size() / 2 && i % 3 != 0) continue;  // those take longest

@@ -56,6 +56,8 @@ TEST_CASE("a field is judged by how near it brings bodies to what they are, and 
   CHECK_FALSE(wrong.helps());
   const auto silent = judgeField(training, silenced(constantField(training.scaling, tenth)), training.pairs);
   CHECK(silent.after == Approx(silent.before).epsilon(1e-9));
+  CHECK(FieldJudgement{0.005, 0.0049}.helps());
+  CHECK_FALSE(FieldJudgement{0.005, 0.00499}.helps());
   auto overflowing = constantField(training.scaling, tenth);
   overflowing.mlp.back().bias.setConstant(3e38F);
   overflowing.mlp.back().weight.setConstant(3e38F);
