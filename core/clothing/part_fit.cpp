@@ -1,0 +1,244 @@
+#include "core/clothing/part_fit.h"
+
+#include <Eigen/Cholesky>
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <limits>
+#include <numeric>
+
+#include "core/mesh/quality.h"
+#include "core/numerics/option_checks.h"
+#include "core/registration/deformation.h"
+#include "core/registration/limb_search.h"
+#include "core/registration/surface_samples.h"
+#include "core/surface/point_tree.h"
+
+namespace shaped {
+namespace {
+
+constexpr int kRestPoints = 3000;      ///< of the rest of the body, which claim the scan points that lie on them
+constexpr double kClaimed = 0.015;     ///< m: so near they claim one that faces their way
+constexpr double kReach = 0.03;        ///< m further than the part is long
+constexpr double kBehind = 0.02;       ///< m behind the joint, along the bone that leads to it
+constexpr double kTangential = 1. / 9; ///< of squared distances across the normal: points do not lie on points
+constexpr Eigen::Index kLeastPoints = 12;
+
+double bounded(double squared, double scale) { return squared / (scale * scale + squared); }
+
+/// Every few of a list, about `most`.
+template <class Value>
+std::vector<Value> thinned(const std::vector<Value>& all, int most) {
+  const std::size_t stride = std::max<std::size_t>(1, (all.size() + std::size_t(most) - 1) / std::size_t(most));
+  std::vector<Value> some;
+  for (std::size_t i = 0; i < all.size(); i += stride) some.push_back(all[i]);
+  return some;
+}
+
+}  // namespace
+
+std::optional<std::string> PartFitOptions::firstViolation() const {
+  if (points < 20) return "points = " + std::to_string(points) + ", want >= 20";
+  if (rounds < 1) return "rounds = " + std::to_string(rounds) + ", want >= 1";
+  for (const auto& [name, value] : {std::pair{"loss_scale", loss_scale},
+                                    {"sigma", sigma},
+                                    {"observations", observations},
+                                    {"pose_deviation", pose_deviation}})
+    if (auto problem = unlessPositive(name, value)) return problem;
+  for (const auto& [name, value] : {std::pair{"normal_scale", normal_scale}, {"prior", prior}})
+    if (!(value >= 0) || !std::isfinite(value)) return std::string(name) + " = " + std::to_string(value) + ", want >= 0";
+  return std::nullopt;
+}
+
+PartFit::PartFit(const ScanSurface& scan, const BodyModel& model, const Eigen::VectorXd& identity, std::int32_t joint,
+                 const Pose& pose, const Pose& likely, const PartFitOptions& options)
+    : model_(model),
+      options_(options),
+      oriented_(scan.hasOrientedNormals()),
+      likely_(likely),
+      rest_joints_(model.restJoints(identity)) {
+  for (std::int32_t j = joint; j < model.skeleton().jointCount(); ++j)
+    if (hangsBelow(model.skeleton(), j, joint)) joints_.push_back(j);
+  chooseVertices(identity);
+  chooseScanPoints(scan, identity, pose);
+}
+
+bool PartFit::tells() const {
+  return Eigen::Index(vertices_.size()) >= kLeastPoints && scan_.cols() >= kLeastPoints;
+}
+
+/// The vertices that the part's joints carry for the most part.
+void PartFit::chooseVertices(const Eigen::VectorXd& identity) {
+  Eigen::VectorXd mine = Eigen::VectorXd::Zero(model_.skeleton().jointCount());
+  for (const auto j : joints_) mine[j] = 1;
+  const Eigen::VectorXd carried = model_.parts().weights * mine;
+  std::vector<std::int32_t> part;
+  for (Eigen::Index v = 0; v < carried.size(); ++v)
+    if (carried[v] > 0.5) part.push_back(std::int32_t(v));
+  vertices_ = thinned(part, options_.points);
+  const Vertices rest = model_.rest(identity), normals = vertexNormals(model_.topology()->faces(), rest);
+  rest_ = rest(vertices_, Eigen::all);
+  rest_normals_ = normals(vertices_, Eigen::all);
+  weights_ = SkinWeights(Eigen::Index(vertices_.size()), model_.skeleton().jointCount());
+  for (std::size_t i = 0; i < vertices_.size(); ++i)
+    for (SkinWeights::InnerIterator entry(model_.parts().weights, vertices_[i]); entry; ++entry)
+      weights_.insert(Eigen::Index(i), entry.col()) = entry.value();
+  weights_.makeCompressed();
+}
+
+void PartFit::chooseScanPoints(const ScanSurface& scan, const Eigen::VectorXd& identity, const Pose& pose) {
+  const auto& faces = model_.topology()->faces();
+  const PosedSkin body = model_.posed({identity, pose});
+  const Vertices normals = vertexNormals(faces, body.vertices());
+  const Eigen::VectorXd areas = areaShares(faces, body.vertices());
+  const std::int32_t joint = joints_.front();
+  centre_ = body.skeleton().joints.row(joint);
+  Eigen::RowVector3d bone = centre_ - body.skeleton().joints.row(model_.skeleton().parent(joint));
+  bone.normalize();
+  Eigen::VectorXd mine = Eigen::VectorXd::Zero(model_.skeleton().jointCount());
+  for (const auto j : joints_) mine[j] = 1;
+  const Eigen::VectorXd carried = model_.parts().weights * mine;
+  double share = 0, length = 0;
+  std::vector<std::int32_t> others;
+  for (Eigen::Index v = 0; v < carried.size(); ++v) {
+    if (carried[v] <= 0.5) {
+      others.push_back(std::int32_t(v));
+      continue;
+    }
+    share += areas[v];
+    length = std::max(length, (body.vertices().row(v) - centre_).norm());
+  }
+  others = thinned(others, kRestPoints);
+  std::optional<PointTree> rest;
+  if (!others.empty()) rest.emplace(Vertices(body.vertices()(others, Eigen::all)));
+  std::vector<Eigen::Index> open;
+  for (Eigen::Index s = 0; s < scan.points().rows(); ++s) {
+    const Eigen::RowVector3d away = scan.points().row(s) - centre_;
+    if (away.norm() > length + kReach || away.dot(bone) < -kBehind) continue;
+    if (rest) {
+      const auto found = rest->nearest(scan.points().row(s));
+      const double cosine = normals.row(others[std::size_t(found.index)]).dot(scan.normals().row(s));
+      if (found.squared_distance < kClaimed * kClaimed && (oriented_ ? cosine : std::abs(cosine)) > 0.5) continue;
+    }
+    open.push_back(s);
+  }
+  const auto chosen = thinned(open, options_.points);
+  scan_.resize(6, Eigen::Index(chosen.size()));
+  for (std::size_t i = 0; i < chosen.size(); ++i)
+    scan_.col(Eigen::Index(i)) << (scan.points().row(chosen[i]) - centre_).transpose(),
+        scan.normals().row(chosen[i]).transpose();
+  const double thinning = double(open.size()) / std::max(1.0, double(chosen.size()));
+  scan_share_ = thinning / std::max(1.0, share * double(scan.points().rows()));
+}
+
+PosedSkin PartFit::skinOf(const Pose& pose) const {
+  return PosedSkin(model_.skeleton(), weights_, rest_, rest_joints_, pose);
+}
+
+PartFit::Points PartFit::pointsOf(const PosedSkin& skin) const {
+  Points points(6, rest_.rows());
+  for (Eigen::Index v = 0; v < rest_.rows(); ++v)
+    points.col(v) << (skin.vertices().row(v) - centre_).transpose(),
+        (skin.blend(v) * rest_normals_.row(v).transpose()).normalized();
+  return points;
+}
+
+PartFit::Pair PartFit::pairOf(const Points& part, Eigen::Index vertex, Eigen::Index scan) const {
+  const Eigen::Vector3d away = part.col(vertex).head<3>() - scan_.col(scan).head<3>();
+  const auto normal = scan_.col(scan).tail<3>(), other = part.col(vertex).tail<3>();
+  const double height = normal.dot(away), scale = options_.normal_scale * options_.normal_scale;
+  const double cosine = normal.dot(other), bent = 2 - 2 * (oriented_ ? cosine : std::abs(cosine));
+  return {vertex, scan, height * height + kTangential * (away.squaredNorm() - height * height) + scale * bent};
+}
+
+PartFit::Pairs PartFit::pairsOf(const Points& part) const {
+  // Squared distances in place and normal, all at once; the normals' part is -2 n . m up to a constant.
+  const double scale = options_.normal_scale * options_.normal_scale;
+  Eigen::MatrixXd normals = part.bottomRows<3>().transpose() * scan_.bottomRows<3>();
+  if (!oriented_) normals = normals.cwiseAbs();
+  Eigen::MatrixXd squares = -2 * (part.topRows<3>().transpose() * scan_.topRows<3>() + scale * normals);
+  squares.colwise() += part.topRows<3>().colwise().squaredNorm().transpose();
+  squares.rowwise() += scan_.topRows<3>().colwise().squaredNorm();
+  Pairs pairs;
+  std::vector<Eigen::Index> nearest(std::size_t(part.cols()), 0);
+  Eigen::VectorXd least = Eigen::VectorXd::Constant(part.cols(), std::numeric_limits<double>::infinity());
+  for (Eigen::Index s = 0; s < scan_.cols(); ++s) {
+    Eigen::Index vertex;
+    squares.col(s).minCoeff(&vertex);
+    pairs.back.push_back(pairOf(part, vertex, s));
+    for (Eigen::Index v = 0; v < part.cols(); ++v)
+      if (squares(v, s) < least[v]) least[v] = squares(v, s), nearest[std::size_t(v)] = s;
+  }
+  for (Eigen::Index v = 0; v < part.cols(); ++v) pairs.outward.push_back(pairOf(part, v, nearest[std::size_t(v)]));
+  return pairs;
+}
+
+double PartFit::turned(const Pose& pose) const {
+  double squares = 0;
+  for (const auto j : joints_) squares += (pose.rotations.row(j) - likely_.rotations.row(j)).squaredNorm();
+  return squares;
+}
+
+double PartFit::cost(const Pairs& pairs, const Pose& pose) const {
+  double part = 0, scan = 0;
+  for (const auto& pair : pairs.outward) part += bounded(pair.squared, options_.loss_scale);
+  for (const auto& pair : pairs.back) scan += bounded(pair.squared, options_.loss_scale);
+  return part / double(pairs.outward.size()) + scan * scan_share_ + options_.prior * turned(pose);
+}
+
+double PartFit::cost(const Pose& pose) const { return cost(pairsOf(pointsOf(skinOf(pose))), pose); }
+
+void PartFit::step(const PosedSkin& skin, const Points& part, const Pairs& pairs, double scale, Pose& pose) const {
+  const auto size = Eigen::Index(3 * joints_.size());
+  Eigen::MatrixXd normal = Eigen::MatrixXd::Zero(size, size);
+  Eigen::VectorXd right = Eigen::VectorXd::Zero(size);
+  Eigen::RowVectorXd row(3 + 3 * model_.skeleton().jointCount()), mine(size);
+  double count = 0;
+  for (const auto* side : {&pairs.outward, &pairs.back})
+    for (const auto& pair : *side) {
+      const double share = scale * scale / (scale * scale + pair.squared), weight = share * share;
+      const Eigen::Vector3d direction = scan_.col(pair.scan).tail<3>();
+      count += 1;
+      if (weight < 1e-3 || direction.isZero(0)) continue;
+      Eigen::Matrix3Xd levers = Eigen::Matrix3Xd::Zero(3, model_.skeleton().jointCount());
+      skin.addLevers(pair.vertex, 1, levers);
+      skin.poseRow(levers, direction, row);
+      for (std::size_t i = 0; i < joints_.size(); ++i)
+        mine.segment<3>(Eigen::Index(3 * i)) = row.segment<3>(3 + 3 * joints_[i]);
+      const double height = direction.dot(part.col(pair.vertex).head<3>() - scan_.col(pair.scan).head<3>());
+      normal.noalias() += weight * mine.transpose() * mine;
+      right.noalias() -= weight * height * mine.transpose();
+    }
+  const double scaled = options_.observations / (options_.sigma * options_.sigma) / std::max(1.0, count);
+  const double prior = 1 / (options_.pose_deviation * options_.pose_deviation);
+  normal *= scaled;
+  right *= scaled;
+  for (std::size_t i = 0; i < joints_.size(); ++i)
+    right.segment<3>(Eigen::Index(3 * i)) -=
+        prior * (pose.rotations.row(joints_[i]) - likely_.rotations.row(joints_[i])).transpose();
+  normal.diagonal().array() += prior + 1e-3 * normal.diagonal().array();
+  const Eigen::VectorXd turn = normal.ldlt().solve(right);
+  for (std::size_t i = 0; i < joints_.size(); ++i)
+    pose.rotations.row(joints_[i]) += turn.segment<3>(Eigen::Index(3 * i)).transpose();
+  if (const auto& limits = model_.parts().limits)
+    for (const auto j : joints_)
+      pose.rotations.row(j) = pose.rotations.row(j).cwiseMax(limits->low.row(j)).cwiseMin(limits->high.row(j));
+}
+
+Pose PartFit::descended(const Pose& start) const {
+  Pose pose = start, best = start;
+  double least = std::numeric_limits<double>::infinity();
+  for (int round = 0; round <= options_.rounds; ++round) {
+    const PosedSkin skin = skinOf(pose);
+    const Points part = pointsOf(skin);
+    const Pairs pairs = pairsOf(part);
+    const double cost = this->cost(pairs, pose);
+    if (cost < least) least = cost, best = pose;
+    // From three times the loss's scale down to it in the first half of the rounds.
+    const double wide = std::max(0.0, 1 - 2.0 * round / options_.rounds);
+    if (round < options_.rounds) step(skin, part, pairs, options_.loss_scale * (1 + 2 * wide), pose);
+  }
+  return best;
+}
+
+}  // namespace shaped
