@@ -16,21 +16,24 @@ using Tried = std::pair<double, Pose>;
 
 bool cheaper(const Tried& one, const Tried& other) { return one.first < other.first; }
 
-Pose meanOf(const Skeleton& skeleton, std::span<const Pose> poses) {
-  Pose mean = restPose(skeleton);
-  for (const auto& pose : poses) mean.rotations += pose.rotations / double(poses.size());
-  return mean;
+/// Axis by axis the median of the poses and of rest: of two neighbours one may be wrong.
+Pose medianOf(const Skeleton& skeleton, std::span<const Pose> poses) {
+  Pose median = restPose(skeleton);
+  std::vector<double> values;
+  for (Eigen::Index i = 0; i < median.rotations.size(); ++i) {
+    values.assign(1, 0);
+    for (const auto& pose : poses) values.push_back(pose.rotations.data()[i]);
+    std::sort(values.begin(), values.end());
+    median.rotations.data()[i] = 0.5 * (values[(values.size() - 1) / 2] + values[values.size() / 2]);
+  }
+  return median;
 }
 
 class Seating {
  public:
   Seating(const BodyModel& model, const Eigen::VectorXd& identity, const PartFit& fit, const ExtremityOptions& options,
           const std::stop_token& stop)
-      : skeleton_(model.skeleton()),
-        joints_(model.restJoints(identity)),
-        fit_(fit),
-        options_(options),
-        stop_(stop) {}
+      : skeleton_(model.skeleton()), joints_(model.restJoints(identity)), fit_(fit), options_(options), stop_(stop) {}
 
   Tried best(const Pose& pose, std::span<const Pose> others) const {
     std::vector<Tried> starts = turns(pose);
@@ -102,15 +105,11 @@ std::optional<std::string> ExtremityOptions::firstViolation() const {
   return std::nullopt;
 }
 
-std::vector<std::int32_t> extremitiesOf(const BodyModel& model, std::span<const Limb> limbs) {
-  const auto& skeleton = model.skeleton();
-  const Eigen::VectorXd carried = model.parts().weights.transpose() * Eigen::VectorXd::Ones(model.parts().mean.rows());
+std::vector<std::int32_t> extremitiesOf(std::span<const Limb> limbs) {
   std::vector<std::int32_t> joints;
   for (const auto& limb : limbs)
-    for (std::int32_t j = limb.lower + 1; j < skeleton.jointCount(); ++j)
-      if (skeleton.parent(j) == limb.lower && carried[j] > 0 &&
-          std::find(joints.begin(), joints.end(), j) == joints.end())
-        joints.push_back(j);
+    if (std::none_of(limbs.begin(), limbs.end(), [&](const Limb& other) { return other.upper == limb.lower; }))
+      joints.push_back(limb.lower);
   return joints;
 }
 
@@ -118,7 +117,7 @@ bool seatExtremity(const ScanSurface& scan, const BodyModel& model, const Eigen:
                    std::span<const Pose> others, Pose& pose, const ExtremityOptions& options,
                    const std::stop_token& stop) {
   if (const auto problem = options.firstViolation()) throw InvalidInput("extremity options", *problem);
-  const Pose likely = meanOf(model.skeleton(), others);
+  const Pose likely = medianOf(model.skeleton(), others);
   const PartFit fit(scan, model, identity, joint, pose, likely, options.fit);
   if (!fit.tells()) return false;
   const Tried best = Seating(model, identity, fit, options, stop).best(pose, others);

@@ -14,16 +14,16 @@ struct ExtremityOptions {
   std::optional<std::string> firstViolation() const;  ///< "starts = 0, want >= 1"
 };
 
-/// The joints at which hands and feet begin: what hangs from the lower joint of a limb and carries something.
-std::vector<std::int32_t> extremitiesOf(const BodyModel& model, std::span<const Limb> limbs);
+/// The joints at which hands and feet begin: the lower joints of limbs (limbsOf) at which no other limb begins.
+std::vector<std::int32_t> extremitiesOf(std::span<const Limb> limbs);
 
 /// Seats one hand or foot by itself, the rest of the body held. Closest points leave a hand palm up, fingers folded, or
 /// on the wrong sheet of skin; so its joint is tried in a grid of turns (twists about the bone that leads to it and
 /// tilts) with what hangs below straight, and as it stands in some other poses, then its fingers or toes one by one;
 /// from the best ones a descent in these joints alone (PartFit).
 ///
-/// joint: of extremitiesOf; others: poses of frames nearby, whose mean the joints are drawn to (to rest without any),
-/// so that what the scan does not show stays where they have it. Returns whether `pose` was bettered; else it is left
+/// joint: of extremitiesOf; others: poses of frames nearby; joints are drawn to the median of these and rest, so that
+/// what the scan does not show stays there. Returns whether `pose` was bettered; else it is left
 /// as it was. Throws InvalidInput naming an option.
 bool seatExtremity(const ScanSurface& scan, const BodyModel& model, const Eigen::VectorXd& identity, std::int32_t joint,
                    std::span<const Pose> others, Pose& pose, const ExtremityOptions& options = {},

@@ -17,11 +17,11 @@
 namespace shaped {
 namespace {
 
-constexpr int kRestPoints = 3000;      ///< of the rest of the body, which claim the scan points that lie on them
-constexpr double kClaimed = 0.015;     ///< m: so near they claim one that faces their way
-constexpr double kReach = 0.03;        ///< m further than the part is long
-constexpr double kBehind = 0.02;       ///< m behind the joint, along the bone that leads to it
-constexpr double kTangential = 1. / 9; ///< of squared distances across the normal: points do not lie on points
+constexpr int kRestPoints = 3000;       ///< of the rest of the body, which claim the scan points that lie on them
+constexpr double kClaimed = 0.015;      ///< m: so near they claim one that faces their way
+constexpr double kReach = 0.03;         ///< m further than the part is long
+constexpr double kBehind = 0.02;        ///< m behind the joint, along the bone that leads to it
+constexpr double kTangential = 1. / 9;  ///< of squared distances across the normal: points do not lie on points
 constexpr Eigen::Index kLeastPoints = 12;
 
 double bounded(double squared, double scale) { return squared / (scale * scale + squared); }
@@ -43,10 +43,12 @@ std::optional<std::string> PartFitOptions::firstViolation() const {
   for (const auto& [name, value] : {std::pair{"loss_scale", loss_scale},
                                     {"sigma", sigma},
                                     {"observations", observations},
-                                    {"pose_deviation", pose_deviation}})
+                                    {"pose_deviation", pose_deviation},
+                                    {"parent_deviation", parent_deviation}})
     if (auto problem = unlessPositive(name, value)) return problem;
   for (const auto& [name, value] : {std::pair{"normal_scale", normal_scale}, {"prior", prior}})
-    if (!(value >= 0) || !std::isfinite(value)) return std::string(name) + " = " + std::to_string(value) + ", want >= 0";
+    if (!(value >= 0) || !std::isfinite(value))
+      return std::string(name) + " = " + std::to_string(value) + ", want >= 0";
   return std::nullopt;
 }
 
@@ -59,13 +61,16 @@ PartFit::PartFit(const ScanSurface& scan, const BodyModel& model, const Eigen::V
       rest_joints_(model.restJoints(identity)) {
   for (std::int32_t j = joint; j < model.skeleton().jointCount(); ++j)
     if (hangsBelow(model.skeleton(), j, joint)) joints_.push_back(j);
+  moving_ = {model.skeleton().parent(joint)};
+  moving_.insert(moving_.end(), joints_.begin(), joints_.end());
+  deviations_.assign(moving_.size(), options.pose_deviation);
+  deviations_[0] = options.parent_deviation;
+  likely_.rotations.row(moving_[0]) = pose.rotations.row(moving_[0]);
   chooseVertices(identity);
   chooseScanPoints(scan, identity, pose);
 }
 
-bool PartFit::tells() const {
-  return Eigen::Index(vertices_.size()) >= kLeastPoints && scan_.cols() >= kLeastPoints;
-}
+bool PartFit::tells() const { return Eigen::Index(vertices_.size()) >= kLeastPoints && scan_.cols() >= kLeastPoints; }
 
 /// The vertices that the part's joints carry for the most part.
 void PartFit::chooseVertices(const Eigen::VectorXd& identity) {
@@ -175,7 +180,9 @@ PartFit::Pairs PartFit::pairsOf(const Points& part) const {
 
 double PartFit::turned(const Pose& pose) const {
   double squares = 0;
-  for (const auto j : joints_) squares += (pose.rotations.row(j) - likely_.rotations.row(j)).squaredNorm();
+  for (std::size_t i = 0; i < moving_.size(); ++i)
+    squares += (pose.rotations.row(moving_[i]) - likely_.rotations.row(moving_[i])).squaredNorm() /
+               (deviations_[i] * deviations_[i]);
   return squares;
 }
 
@@ -183,13 +190,14 @@ double PartFit::cost(const Pairs& pairs, const Pose& pose) const {
   double part = 0, scan = 0;
   for (const auto& pair : pairs.outward) part += bounded(pair.squared, options_.loss_scale);
   for (const auto& pair : pairs.back) scan += bounded(pair.squared, options_.loss_scale);
-  return part / double(pairs.outward.size()) + scan * scan_share_ + options_.prior * turned(pose);
+  return part / double(pairs.outward.size()) + scan * scan_share_ +
+         options_.prior * options_.pose_deviation * options_.pose_deviation * turned(pose);
 }
 
 double PartFit::cost(const Pose& pose) const { return cost(pairsOf(pointsOf(skinOf(pose))), pose); }
 
 void PartFit::step(const PosedSkin& skin, const Points& part, const Pairs& pairs, double scale, Pose& pose) const {
-  const auto size = Eigen::Index(3 * joints_.size());
+  const auto size = Eigen::Index(3 * moving_.size());
   Eigen::MatrixXd normal = Eigen::MatrixXd::Zero(size, size);
   Eigen::VectorXd right = Eigen::VectorXd::Zero(size);
   Eigen::RowVectorXd row(3 + 3 * model_.skeleton().jointCount()), mine(size);
@@ -203,30 +211,38 @@ void PartFit::step(const PosedSkin& skin, const Points& part, const Pairs& pairs
       Eigen::Matrix3Xd levers = Eigen::Matrix3Xd::Zero(3, model_.skeleton().jointCount());
       skin.addLevers(pair.vertex, 1, levers);
       skin.poseRow(levers, direction, row);
-      for (std::size_t i = 0; i < joints_.size(); ++i)
-        mine.segment<3>(Eigen::Index(3 * i)) = row.segment<3>(3 + 3 * joints_[i]);
+      for (std::size_t i = 0; i < moving_.size(); ++i)
+        mine.segment<3>(Eigen::Index(3 * i)) = row.segment<3>(3 + 3 * moving_[i]);
       const double height = direction.dot(part.col(pair.vertex).head<3>() - scan_.col(pair.scan).head<3>());
       normal.noalias() += weight * mine.transpose() * mine;
       right.noalias() -= weight * height * mine.transpose();
     }
   const double scaled = options_.observations / (options_.sigma * options_.sigma) / std::max(1.0, count);
-  const double prior = 1 / (options_.pose_deviation * options_.pose_deviation);
   normal *= scaled;
   right *= scaled;
-  for (std::size_t i = 0; i < joints_.size(); ++i)
+  normal.diagonal() *= 1 + 1e-3;
+  for (std::size_t i = 0; i < moving_.size(); ++i) {
+    const double prior = 1 / (deviations_[i] * deviations_[i]);
+    normal.diagonal().segment<3>(Eigen::Index(3 * i)).array() += prior;
     right.segment<3>(Eigen::Index(3 * i)) -=
-        prior * (pose.rotations.row(joints_[i]) - likely_.rotations.row(joints_[i])).transpose();
-  normal.diagonal().array() += prior + 1e-3 * normal.diagonal().array();
+        prior * (pose.rotations.row(moving_[i]) - likely_.rotations.row(moving_[i])).transpose();
+  }
   const Eigen::VectorXd turn = normal.ldlt().solve(right);
-  for (std::size_t i = 0; i < joints_.size(); ++i)
-    pose.rotations.row(joints_[i]) += turn.segment<3>(Eigen::Index(3 * i)).transpose();
-  if (const auto& limits = model_.parts().limits)
-    for (const auto j : joints_)
-      pose.rotations.row(j) = pose.rotations.row(j).cwiseMax(limits->low.row(j)).cwiseMin(limits->high.row(j));
+  for (std::size_t i = 0; i < moving_.size(); ++i)
+    pose.rotations.row(moving_[i]) += turn.segment<3>(Eigen::Index(3 * i)).transpose();
+  keepLimits(pose);
+}
+
+void PartFit::keepLimits(Pose& pose) const {
+  const auto& limits = model_.parts().limits;
+  if (!limits) return;
+  for (const auto j : moving_)
+    pose.rotations.row(j) = pose.rotations.row(j).cwiseMax(limits->low.row(j)).cwiseMin(limits->high.row(j));
 }
 
 Pose PartFit::descended(const Pose& start) const {
-  Pose pose = start, best = start;
+  Pose pose = start, best;
+  keepLimits(pose);
   double least = std::numeric_limits<double>::infinity();
   for (int round = 0; round <= options_.rounds; ++round) {
     const PosedSkin skin = skinOf(pose);
