@@ -15,22 +15,25 @@ class ClothedSequence {
 
   std::size_t size() const { return frames_.size(); }
 
-  /// The identity on some frames, their postures held.
+  /// The identity on some frames together with the postures of at most options.together of them, spread evenly: how
+  /// long a leg is and how far a knee bends under cloth hang together, and in turn each would wait for the other. Then,
+  /// where there are more, the identity on all with the postures held.
   Outcome settleIdentity(BodySequence& state, const std::vector<std::size_t>& frames, const ClothingTerms& terms,
                          const Eigen::VectorXd& tightness) const;
   /// The posture of one frame, the identity held.
   Outcome settlePosture(BodySequence& state, std::size_t frame, const ClothingTerms& terms,
                         const Eigen::VectorXd& tightness) const;
-  /// Tries limbs of one frame in other ways (otherLimbPoses, with those of `neighbours`) and keeps what lies better.
+  /// Tries limbs of one frame in other ways (exchangedLimbs; otherLimbPoses, with those of `neighbours`) and keeps what
+  /// lies better.
   void reseatLimbs(BodySequence& state, std::size_t frame, const std::vector<std::size_t>& neighbours,
                    const ClothingTerms& terms, const Eigen::VectorXd& tightness) const;
 
-  /// The same with hands and feet, joint by joint, as at rest (straightenedTips).
-  void straightenTips(BodySequence& state, std::size_t frame, const ClothingTerms& terms,
-                      const Eigen::VectorXd& tightness) const;
   /// The same with the limbs as a search over all their turns seats them.
   void searchLimbs(BodySequence& state, std::size_t frame, const ClothingTerms& terms,
                    const Eigen::VectorXd& tightness) const;
+
+  /// Seats hands and feet of one frame by themselves (seatExtremity), drawn to how they stand in `neighbours`.
+  void seatExtremities(BodySequence& state, std::size_t frame, const std::vector<std::size_t>& neighbours) const;
 
   /// How much each vertex that takes part may be believed to be skin, or cloth drawn tight: by how little its gap
   /// varies over some frames, (s^2 / (s^2 + variance))^2 with s the option tight_spread, relative to the tightest
@@ -49,6 +52,7 @@ class ClothedSequence {
   /// Settles one frame from each of some poses, and keeps the one that lies best, if better than the present one.
   void keepBest(BodySequence& state, std::size_t frame, std::span<const Pose> starts, const ClothingTerms& terms,
                 const Eigen::VectorXd& tightness) const;
+  std::vector<Pose> posesOf(const BodySequence& state, const std::vector<std::size_t>& frames) const;
   Vertices surfaceOf(const Eigen::VectorXd& identity, const Pose& pose) const;
   BodyFitOptions fitOptions(const std::vector<std::vector<SurfaceTarget>>& targets, Moving moving) const;
 

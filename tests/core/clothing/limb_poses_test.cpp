@@ -18,34 +18,10 @@ const Skeleton kArm({{"trunk", -1},
                      {"fingertip", 4},
                      {"thumb", 3},
                      {"head", 0}});
-constexpr std::int32_t kForearm = 2, kHand = 3, kFinger = 4, kTip = 5, kThumb = 6, kHead = 7;
+constexpr std::int32_t kForearm = 2, kHead = 7;
 constexpr Limb kLimb{1, kForearm};
 
 }  // namespace
-
-TEST_CASE("tips that are bent are put to rest one by one, with what hangs below them") {
-  Pose pose = randomPose(kArm, 0.2, 1);
-  pose.rotations.row(kFinger) << 1, 0, 0;
-  pose.rotations.row(kThumb) << 0, -0.5, 0;
-  pose.rotations.row(kForearm) << 0, 0, 2;  // the limb's own joints bend as they like
-  pose.rotations.row(kHead) << 0, 0, 2;
-  const auto poses = straightenedTips(kArm, kLimb, pose, 0.35);
-  REQUIRE(poses.size() == 2);
-  Pose expected = pose;
-  expected.rotations.row(kFinger).setZero();
-  expected.rotations.row(kTip).setZero();
-  CHECK(poses[0].rotations == expected.rotations);
-  CHECK(poses[0].translation == pose.translation);
-  expected = pose;
-  expected.rotations.row(kThumb).setZero();
-  CHECK(poses[1].rotations == expected.rotations);
-
-  pose.rotations.row(kHand) << 0.4, 0, 0;
-  const auto with_hand = straightenedTips(kArm, kLimb, pose, 0.35);
-  REQUIRE(with_hand.size() == 3);
-  CHECK(with_hand[0].rotations.middleRows<4>(kHand).isZero(0));
-  CHECK(straightenedTips(kArm, kLimb, restPose(kArm), 0.35).empty());
-}
 
 TEST_CASE("a limb's other ways are its lower part at rest, untwisted, and as others hold it") {
   const Pose pose = randomPose(kArm, 0.5, 2), other = randomPose(kArm, 0.5, 3);
@@ -62,4 +38,36 @@ TEST_CASE("a limb's other ways are its lower part at rest, untwisted, and as oth
   CHECK(std::abs(poses[1].rotations(1, 0)) < 1e-9);
   CHECK(poses[2].rotations.middleRows<6>(1) == other.rotations.middleRows<6>(1));
   CHECK(poses[2].rotations.row(kHead) == pose.rotations.row(kHead));
+}
+
+TEST_CASE("left and right are exchanged as a mirror would have them, branch by branch") {
+  const Skeleton skeleton({{"hips", -1},
+                           {"left hip", 0},
+                           {"left leg", 1},
+                           {"left shin", 2},
+                           {"right hip", 0},
+                           {"right leg", 4},
+                           {"right shin", 5},
+                           {"tail", 0},
+                           {"tip", 7}});
+  Vertices joints = Vertices::Zero(9, 3);
+  joints.col(0) << 0, 0.05, 0.1, 0.12, -0.05, -0.1, -0.12, 0, 0;
+  joints.col(1) << 1, 0.95, 0.9, 0.5, 0.95, 0.9, 0.5, 1, 1.1;
+  joints.col(2) << 0, 0, 0, 0.02, 0, 0, 0.02, -0.3, -0.6;
+  const std::vector<Limb> limbs = {{2, 3}, {5, 6}, {7, 8}};
+  Pose pose = randomPose(skeleton, 0.8, 4);
+  pose.rotations.row(0).setZero();
+  const auto poses = exchangedLimbs(skeleton, joints, limbs, pose);
+  REQUIRE(poses.size() == 1);  // the tail has no twin
+  CHECK(poses[0].rotations.bottomRows<2>() == pose.rotations.bottomRows<2>());
+  const Vertices before = poseSkeleton(skeleton, joints, {Eigen::Vector3d::Zero(), pose.rotations}).joints;
+  const Vertices after = poseSkeleton(skeleton, joints, {Eigen::Vector3d::Zero(), poses[0].rotations}).joints;
+  for (const auto& [left, right] : {std::pair{2, 5}, {3, 6}}) {
+    CHECK((after.row(left) - before.row(right).cwiseProduct(Eigen::RowVector3d(-1, 1, 1))).norm() < 1e-12);
+    CHECK((after.row(right) - before.row(left).cwiseProduct(Eigen::RowVector3d(-1, 1, 1))).norm() < 1e-12);
+  }
+  // Twice is as before; legs of different lengths are no pair.
+  CHECK(exchangedLimbs(skeleton, joints, limbs, poses[0])[0].rotations.isApprox(pose.rotations));
+  joints.row(6) *= 0.5;
+  CHECK(exchangedLimbs(skeleton, joints, limbs, pose).empty());
 }
