@@ -16,15 +16,15 @@
 namespace shaped::experiments {
 namespace {
 
-constexpr int kFrames = 8, kStep = 5;     ///< of 30 a second
-constexpr std::size_t kRunner = 12;       ///< of those with a posed variant: a woman of 1.70 m
+constexpr int kFrames = 8, kStep = 5;          ///< of 30 a second
+constexpr std::size_t kRunner = 12;            ///< of those with a posed variant: a woman of 1.70 m
 constexpr double kThin = 0.01, kThick = 0.06;  ///< m
 
 /// How much of each vertex's skin the cloth covers, 0 to 1: what joints of trunk, upper arms and legs carry of it.
 Eigen::VectorXd covered(const Rig& rig) {
-  const std::vector<std::string> dressed = {"Hips",        "LHipJoint", "RHipJoint", "LeftUpLeg",     "RightUpLeg",
-                                            "LeftLeg",     "RightLeg",  "LowerBack", "Spine",         "Spine1",
-                                            "LeftShoulder", "LeftArm",  "RightArm",  "RightShoulder"};
+  const std::vector<std::string> dressed = {"Hips",         "LHipJoint", "RHipJoint", "LeftUpLeg",    "RightUpLeg",
+                                            "LeftLeg",      "RightLeg",  "LowerBack", "Spine",        "Spine1",
+                                            "LeftShoulder", "LeftArm",   "RightArm",  "RightShoulder"};
   Eigen::VectorXd joints = Eigen::VectorXd::Zero(rig.skeleton.jointCount());
   for (const auto& name : dressed) joints[rig.skeleton.find(name).value()] = 1;
   return rig.weights * joints;
