@@ -54,7 +54,6 @@ void ClothedSequence::reseatLimbs(BodySequence& state, std::size_t frame, const 
                                   const ClothingTerms& terms, const Eigen::VectorXd& tightness) const {
   const auto others = posesOf(state, neighbours);
   const Vertices joints = model_.restJoints(state.identity);
-  keepBest(state, frame, exchangedLimbs(model_.skeleton(), joints, limbs_, state.poses[frame]), terms, tightness);
   for (const auto& limb : limbs_)
     keepBest(state, frame, otherLimbPoses(model_.skeleton(), joints, limb, state.poses[frame], others), terms,
              tightness);

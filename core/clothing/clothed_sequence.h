@@ -23,8 +23,7 @@ class ClothedSequence {
   /// The posture of one frame, the identity held.
   Outcome settlePosture(BodySequence& state, std::size_t frame, const ClothingTerms& terms,
                         const Eigen::VectorXd& tightness) const;
-  /// Tries limbs of one frame in other ways (exchangedLimbs; otherLimbPoses, with those of `neighbours`) and keeps what
-  /// lies better.
+  /// Tries limbs of one frame in other ways (otherLimbPoses, with those of `neighbours`) and keeps what lies better.
   void reseatLimbs(BodySequence& state, std::size_t frame, const std::vector<std::size_t>& neighbours,
                    const ClothingTerms& terms, const Eigen::VectorXd& tightness) const;
 

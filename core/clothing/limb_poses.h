@@ -16,10 +16,4 @@ void straighten(const Skeleton& skeleton, std::int32_t joint, Pose& pose);
 std::vector<Pose> otherLimbPoses(const Skeleton& skeleton, const Vertices& rest_joints, const Limb& limb,
                                  const Pose& pose, std::span<const Pose> others);
 
-/// Left and right taken for each other: one pose a pair of limbs that branch off alike from one joint, in which each
-/// stands as the other does in `pose`, mirrored (legs that pass each other, of which a search has confused the two).
-/// rest_joints: J x 3.
-std::vector<Pose> exchangedLimbs(const Skeleton& skeleton, const Vertices& rest_joints, std::span<const Limb> limbs,
-                                 const Pose& pose);
-
 }  // namespace shaped
