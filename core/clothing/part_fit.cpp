@@ -22,6 +22,7 @@ constexpr double kClaimed = 0.015;      ///< m: so near they claim one that face
 constexpr double kReach = 0.03;         ///< m further than the part is long
 constexpr double kBehind = 0.02;        ///< m behind the joint, along the bone that leads to it
 constexpr double kTangential = 1. / 9;  ///< of squared distances across the normal: points do not lie on points
+constexpr double kDamping = 1e-3;
 constexpr Eigen::Index kLeastPoints = 12;
 
 double bounded(double squared, double scale) { return squared / (scale * scale + squared); }
@@ -34,6 +35,26 @@ std::vector<Value> thinned(const std::vector<Value>& all, int most) {
   for (std::size_t i = 0; i < all.size(); i += stride) some.push_back(all[i]);
   return some;
 }
+
+/// Points of the posed body outside the part: what of the scan lies on them is not the part's.
+class RestOfBody {
+ public:
+  RestOfBody(const Vertices& vertices, const Vertices& normals, const std::vector<std::int32_t>& chosen)
+      : normals_(normals(chosen, Eigen::all)) {
+    if (!chosen.empty()) tree_.emplace(Vertices(vertices(chosen, Eigen::all)));
+  }
+
+  bool claims(const Eigen::RowVector3d& point, const Eigen::RowVector3d& normal, bool oriented) const {
+    if (!tree_) return false;
+    const auto found = tree_->nearest(point);
+    const double cosine = normals_.row(found.index).dot(normal);
+    return found.squared_distance < kClaimed * kClaimed && (oriented ? cosine : std::abs(cosine)) > 0.5;
+  }
+
+ private:
+  Vertices normals_;
+  std::optional<PointTree> tree_;
+};
 
 }  // namespace
 
@@ -72,14 +93,21 @@ PartFit::PartFit(const ScanSurface& scan, const BodyModel& model, const Eigen::V
 
 bool PartFit::tells() const { return Eigen::Index(vertices_.size()) >= kLeastPoints && scan_.cols() >= kLeastPoints; }
 
-/// The vertices that the part's joints carry for the most part.
-void PartFit::chooseVertices(const Eigen::VectorXd& identity) {
+/// Whether the part's joints carry a vertex for the most part.
+std::vector<bool> PartFit::carried() const {
   Eigen::VectorXd mine = Eigen::VectorXd::Zero(model_.skeleton().jointCount());
   for (const auto j : joints_) mine[j] = 1;
-  const Eigen::VectorXd carried = model_.parts().weights * mine;
+  const Eigen::VectorXd shares = model_.parts().weights * mine;
+  std::vector<bool> carried;
+  for (const double share : shares) carried.push_back(share > 0.5);
+  return carried;
+}
+
+void PartFit::chooseVertices(const Eigen::VectorXd& identity) {
+  const auto mine = carried();
   std::vector<std::int32_t> part;
-  for (Eigen::Index v = 0; v < carried.size(); ++v)
-    if (carried[v] > 0.5) part.push_back(std::int32_t(v));
+  for (std::size_t v = 0; v < mine.size(); ++v)
+    if (mine[v]) part.push_back(std::int32_t(v));
   vertices_ = thinned(part, options_.points);
   const Vertices rest = model_.rest(identity), normals = vertexNormals(model_.topology()->faces(), rest);
   rest_ = rest(vertices_, Eigen::all);
@@ -94,39 +122,30 @@ void PartFit::chooseVertices(const Eigen::VectorXd& identity) {
 void PartFit::chooseScanPoints(const ScanSurface& scan, const Eigen::VectorXd& identity, const Pose& pose) {
   const auto& faces = model_.topology()->faces();
   const PosedSkin body = model_.posed({identity, pose});
-  const Vertices normals = vertexNormals(faces, body.vertices());
   const Eigen::VectorXd areas = areaShares(faces, body.vertices());
-  const std::int32_t joint = joints_.front();
-  centre_ = body.skeleton().joints.row(joint);
-  Eigen::RowVector3d bone = centre_ - body.skeleton().joints.row(model_.skeleton().parent(joint));
-  bone.normalize();
-  Eigen::VectorXd mine = Eigen::VectorXd::Zero(model_.skeleton().jointCount());
-  for (const auto j : joints_) mine[j] = 1;
-  const Eigen::VectorXd carried = model_.parts().weights * mine;
+  const auto& bones = body.skeleton().joints;
+  centre_ = bones.row(joints_.front());
+  const Eigen::RowVector3d bone = (centre_ - bones.row(moving_.front())).normalized();
+  const auto mine = carried();
   double share = 0, length = 0;
   std::vector<std::int32_t> others;
-  for (Eigen::Index v = 0; v < carried.size(); ++v) {
-    if (carried[v] <= 0.5) {
+  for (Eigen::Index v = 0; v < areas.size(); ++v)
+    if (mine[std::size_t(v)])
+      share += areas[v], length = std::max(length, (body.vertices().row(v) - centre_).norm());
+    else
       others.push_back(std::int32_t(v));
-      continue;
-    }
-    share += areas[v];
-    length = std::max(length, (body.vertices().row(v) - centre_).norm());
-  }
-  others = thinned(others, kRestPoints);
-  std::optional<PointTree> rest;
-  if (!others.empty()) rest.emplace(Vertices(body.vertices()(others, Eigen::all)));
+  const RestOfBody rest(body.vertices(), vertexNormals(faces, body.vertices()), thinned(others, kRestPoints));
   std::vector<Eigen::Index> open;
   for (Eigen::Index s = 0; s < scan.points().rows(); ++s) {
     const Eigen::RowVector3d away = scan.points().row(s) - centre_;
-    if (away.norm() > length + kReach || away.dot(bone) < -kBehind) continue;
-    if (rest) {
-      const auto found = rest->nearest(scan.points().row(s));
-      const double cosine = normals.row(others[std::size_t(found.index)]).dot(scan.normals().row(s));
-      if (found.squared_distance < kClaimed * kClaimed && (oriented_ ? cosine : std::abs(cosine)) > 0.5) continue;
-    }
-    open.push_back(s);
+    if (away.norm() <= length + kReach && away.dot(bone) >= -kBehind &&
+        !rest.claims(scan.points().row(s), scan.normals().row(s), oriented_))
+      open.push_back(s);
   }
+  keepScanPoints(scan, open, share);
+}
+
+void PartFit::keepScanPoints(const ScanSurface& scan, const std::vector<Eigen::Index>& open, double share) {
   const auto chosen = thinned(open, options_.points);
   scan_.resize(6, Eigen::Index(chosen.size()));
   for (std::size_t i = 0; i < chosen.size(); ++i)
@@ -196,11 +215,21 @@ double PartFit::cost(const Pairs& pairs, const Pose& pose) const {
 
 double PartFit::cost(const Pose& pose) const { return cost(pairsOf(pointsOf(skinOf(pose))), pose); }
 
+Eigen::RowVectorXd PartFit::rowOf(const PosedSkin& skin, const Pair& pair) const {
+  const auto joints = model_.skeleton().jointCount();
+  Eigen::Matrix3Xd levers = Eigen::Matrix3Xd::Zero(3, joints);
+  skin.addLevers(pair.vertex, 1, levers);
+  Eigen::RowVectorXd all(3 + 3 * joints), mine(Eigen::Index(3 * moving_.size()));
+  skin.poseRow(levers, scan_.col(pair.scan).tail<3>(), all);
+  for (std::size_t i = 0; i < moving_.size(); ++i)
+    mine.segment<3>(Eigen::Index(3 * i)) = all.segment<3>(3 + 3 * moving_[i]);
+  return mine;
+}
+
 void PartFit::step(const PosedSkin& skin, const Points& part, const Pairs& pairs, double scale, Pose& pose) const {
   const auto size = Eigen::Index(3 * moving_.size());
   Eigen::MatrixXd normal = Eigen::MatrixXd::Zero(size, size);
   Eigen::VectorXd right = Eigen::VectorXd::Zero(size);
-  Eigen::RowVectorXd row(3 + 3 * model_.skeleton().jointCount()), mine(size);
   double count = 0;
   for (const auto* side : {&pairs.outward, &pairs.back})
     for (const auto& pair : *side) {
@@ -208,28 +237,26 @@ void PartFit::step(const PosedSkin& skin, const Points& part, const Pairs& pairs
       const Eigen::Vector3d direction = scan_.col(pair.scan).tail<3>();
       count += 1;
       if (weight < 1e-3 || direction.isZero(0)) continue;
-      Eigen::Matrix3Xd levers = Eigen::Matrix3Xd::Zero(3, model_.skeleton().jointCount());
-      skin.addLevers(pair.vertex, 1, levers);
-      skin.poseRow(levers, direction, row);
-      for (std::size_t i = 0; i < moving_.size(); ++i)
-        mine.segment<3>(Eigen::Index(3 * i)) = row.segment<3>(3 + 3 * moving_[i]);
+      const Eigen::RowVectorXd row = rowOf(skin, pair);
       const double height = direction.dot(part.col(pair.vertex).head<3>() - scan_.col(pair.scan).head<3>());
-      normal.noalias() += weight * mine.transpose() * mine;
-      right.noalias() -= weight * height * mine.transpose();
+      normal.noalias() += weight * row.transpose() * row;
+      right.noalias() -= weight * height * row.transpose();
     }
   const double scaled = options_.observations / (options_.sigma * options_.sigma) / std::max(1.0, count);
-  normal *= scaled;
-  right *= scaled;
-  normal.diagonal() *= 1 + 1e-3;
+  turn(scaled * normal, scaled * right, pose);
+}
+
+void PartFit::turn(Eigen::MatrixXd normal, Eigen::VectorXd right, Pose& pose) const {
+  normal.diagonal() *= 1 + kDamping;
   for (std::size_t i = 0; i < moving_.size(); ++i) {
     const double prior = 1 / (deviations_[i] * deviations_[i]);
     normal.diagonal().segment<3>(Eigen::Index(3 * i)).array() += prior;
     right.segment<3>(Eigen::Index(3 * i)) -=
         prior * (pose.rotations.row(moving_[i]) - likely_.rotations.row(moving_[i])).transpose();
   }
-  const Eigen::VectorXd turn = normal.ldlt().solve(right);
+  const Eigen::VectorXd turns = normal.ldlt().solve(right);
   for (std::size_t i = 0; i < moving_.size(); ++i)
-    pose.rotations.row(moving_[i]) += turn.segment<3>(Eigen::Index(3 * i)).transpose();
+    pose.rotations.row(moving_[i]) += turns.segment<3>(Eigen::Index(3 * i)).transpose();
   keepLimits(pose);
 }
 

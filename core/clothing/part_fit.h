@@ -51,7 +51,7 @@ class PartFit {
   Pose descended(const Pose& start) const;
 
  private:
-  /// Positions, and normals times normal_scale, as columns of six numbers; positions from the joint.
+  /// Positions from the joint, and normals, as columns of six numbers.
   using Points = Eigen::Matrix<double, 6, Eigen::Dynamic>;
   struct Pair {
     Eigen::Index vertex, scan;
@@ -61,8 +61,11 @@ class PartFit {
     std::vector<Pair> outward, back;  ///< of each of the part's points, and of each of the scan's
   };
 
+  std::vector<bool> carried() const;
   void chooseVertices(const Eigen::VectorXd& identity);
   void chooseScanPoints(const ScanSurface& scan, const Eigen::VectorXd& identity, const Pose& pose);
+  /// share: of the body's surface that is the part's.
+  void keepScanPoints(const ScanSurface& scan, const std::vector<Eigen::Index>& open, double share);
   PosedSkin skinOf(const Pose& pose) const;
   Points pointsOf(const PosedSkin& skin) const;
   Pairs pairsOf(const Points& part) const;
@@ -70,7 +73,11 @@ class PartFit {
   double cost(const Pairs& pairs, const Pose& pose) const;
   /// From what is likely, in standard deviations, squared.
   double turned(const Pose& pose) const;
+  /// How a pair's height follows the joints that move.
+  Eigen::RowVectorXd rowOf(const PosedSkin& skin, const Pair& pair) const;
   void step(const PosedSkin& skin, const Points& part, const Pairs& pairs, double scale, Pose& pose) const;
+  /// Adds the prior to normal equations, and takes the step.
+  void turn(Eigen::MatrixXd normal, Eigen::VectorXd right, Pose& pose) const;
   void keepLimits(Pose& pose) const;
 
   const BodyModel& model_;
