@@ -18,7 +18,18 @@ std::vector<std::size_t> spread(const std::vector<std::size_t>& frames, std::siz
   return some;
 }
 
+/// Whether a limb begins where another ends, as a forearm does: it is tried with that one.
+bool continuesOther(const Limb& limb, const std::vector<Limb>& limbs) {
+  return std::any_of(limbs.begin(), limbs.end(), [&](const Limb& other) { return other.lower == limb.upper; });
+}
+
 }  // namespace
+
+std::vector<Pose> posesOf(const BodySequence& state, const std::vector<std::size_t>& frames) {
+  std::vector<Pose> poses;
+  for (const auto f : frames) poses.push_back(state.poses[f]);
+  return poses;
+}
 
 ClothedSequence::ClothedSequence(const std::deque<ScanSurface>& scans, const BodyModel& model,
                                  std::span<const std::vector<Landmark>> landmarks, const ClothingOptions& options)
@@ -50,13 +61,13 @@ Outcome ClothedSequence::settlePosture(BodySequence& state, std::size_t frame, c
   return result;
 }
 
-void ClothedSequence::reseatLimbs(BodySequence& state, std::size_t frame, const std::vector<std::size_t>& neighbours,
+void ClothedSequence::reseatLimbs(BodySequence& state, std::size_t frame, std::span<const Pose> others,
                                   const ClothingTerms& terms, const Eigen::VectorXd& tightness) const {
-  const auto others = posesOf(state, neighbours);
   const Vertices joints = model_.restJoints(state.identity);
   for (const auto& limb : limbs_)
-    keepBest(state, frame, otherLimbPoses(model_.skeleton(), joints, limb, state.poses[frame], others), terms,
-             tightness);
+    if (!continuesOther(limb, limbs_))
+      keepBest(state, frame, otherLimbPoses(model_.skeleton(), joints, limb, state.poses[frame], others), terms,
+               tightness);
 }
 
 void ClothedSequence::searchLimbs(BodySequence& state, std::size_t frame, const ClothingTerms& terms,
@@ -72,6 +83,7 @@ void ClothedSequence::searchLimbs(BodySequence& state, std::size_t frame, const 
           shaped::searchLimbs(scans_[frame], model_, {state.identity, start}, search, options_.stop).state.pose);
   }
   keepBest(state, frame, starts, terms, tightness);
+  reseatLimbs(state, frame, starts, terms, tightness);
 }
 
 void ClothedSequence::seatExtremities(BodySequence& state, std::size_t frame,
@@ -156,12 +168,6 @@ Solved<BodySequence> ClothedSequence::settled(BodySequence state, const std::vec
     }
   }
   return result;
-}
-
-std::vector<Pose> ClothedSequence::posesOf(const BodySequence& state, const std::vector<std::size_t>& frames) const {
-  std::vector<Pose> poses;
-  for (const auto f : frames) poses.push_back(state.poses[f]);
-  return poses;
 }
 
 Vertices ClothedSequence::surfaceOf(const Eigen::VectorXd& identity, const Pose& pose) const {

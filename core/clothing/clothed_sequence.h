@@ -6,6 +6,9 @@
 
 namespace shaped {
 
+/// The poses of some frames.
+std::vector<Pose> posesOf(const BodySequence& state, const std::vector<std::size_t>& frames);
+
 /// The frames of a dressed person, and the steps that minimise (10.1) over them.
 class ClothedSequence {
  public:
@@ -23,14 +26,13 @@ class ClothedSequence {
   /// The posture of one frame, the identity held.
   Outcome settlePosture(BodySequence& state, std::size_t frame, const ClothingTerms& terms,
                         const Eigen::VectorXd& tightness) const;
-  /// Tries limbs of one frame in other ways (otherLimbPoses, with those of `neighbours`) and keeps what lies better.
-  void reseatLimbs(BodySequence& state, std::size_t frame, const std::vector<std::size_t>& neighbours,
-                   const ClothingTerms& terms, const Eigen::VectorXd& tightness) const;
-
-  /// The same with the limbs as a search over all their turns seats them.
+  /// Tries limbs of one frame in other ways (otherLimbPoses, with those of `others`) and keeps what lies better.
+  void reseatLimbs(BodySequence& state, std::size_t frame, std::span<const Pose> others, const ClothingTerms& terms,
+                   const Eigen::VectorXd& tightness) const;
+  /// The same with the limbs as a search over all their turns seats them: all at once, then one by one, as it may find
+  /// an arm and lose a leg.
   void searchLimbs(BodySequence& state, std::size_t frame, const ClothingTerms& terms,
                    const Eigen::VectorXd& tightness) const;
-
   /// Seats hands and feet of one frame by themselves (seatExtremity), drawn to how they stand in `neighbours`.
   void seatExtremities(BodySequence& state, std::size_t frame, const std::vector<std::size_t>& neighbours) const;
 
@@ -51,7 +53,6 @@ class ClothedSequence {
   /// Settles one frame from each of some poses, and keeps the one that lies best, if better than the present one.
   void keepBest(BodySequence& state, std::size_t frame, std::span<const Pose> starts, const ClothingTerms& terms,
                 const Eigen::VectorXd& tightness) const;
-  std::vector<Pose> posesOf(const BodySequence& state, const std::vector<std::size_t>& frames) const;
   Vertices surfaceOf(const Eigen::VectorXd& identity, const Pose& pose) const;
   BodyFitOptions fitOptions(const std::vector<std::vector<SurfaceTarget>>& targets, Moving moving) const;
 

@@ -95,7 +95,7 @@ class Estimation {
   void reseat(const ClothingTerms& terms, const Eigen::VectorXd& tightness) {
     for (std::size_t f = 0; f < sequence_.size() && !options_.stop.stop_requested(); ++f) {
       tell(options_, "limbs of frame " + std::to_string(f + 1), 0.6 + 0.1 * double(f) / double(sequence_.size()));
-      sequence_.reseatLimbs(state_, f, nearest(f), terms, tightness);
+      sequence_.reseatLimbs(state_, f, posesOf(state_, nearest(f)), terms, tightness);
       const bool missed = std::find(trusted_.begin(), trusted_.end(), f) == trusted_.end();
       if (missed) sequence_.searchLimbs(state_, f, terms, tightness);
     }
