@@ -96,6 +96,15 @@ TEST_CASE("more frames tell more of what is under the cloth") {
   CHECK(misfit(4) < misfit(1));
 }
 
+TEST_CASE("where only some postures move with the identity, the others still count") {
+  const DressedTube tube(4);
+  ClothingOptions options;
+  options.together = 2;
+  const auto found = estimateUnderClothing(tube.scans, tube.model, tube.landmarks, options).solution;
+  CHECK(tube.error(found) < 0.25 * tube.thickness);
+  CHECK(meanInside(found) >= 0.95);
+}
+
 TEST_CASE("estimating under clothing refuses what it cannot read, and stops when asked to") {
   const DressedTube tube(2);
   CHECK_THROWS_WITH(estimateUnderClothing({}, tube.model, {}), Catch::Contains("scans: is empty"));
@@ -115,6 +124,14 @@ TEST_CASE("estimating under clothing refuses what it cannot read, and stops when
   options.retries = 0;  // a frame that was not fitted alone would have no posture
   CHECK_THROWS_WITH(estimateUnderClothing(tube.scans, tube.model, {}, options),
                     Catch::Contains("retries = 0, want >= 1"));
+  options = {};
+  options.together = 0;
+  CHECK_THROWS_WITH(estimateUnderClothing(tube.scans, tube.model, {}, options),
+                    Catch::Contains("together = 0, want >= 1"));
+  options = {};
+  options.extremities.fit.rounds = 0;
+  CHECK_THROWS_WITH(estimateUnderClothing(tube.scans, tube.model, {}, options),
+                    Catch::Contains("extremities.fit.rounds = 0, want >= 1"));
   std::stop_source source;
   source.request_stop();
   options = {};
