@@ -46,7 +46,7 @@ Outcome ClothedSequence::settleIdentity(BodySequence& state, const std::vector<s
       settled({state.identity, posesOf(state, some)}, some, terms, tightness, {true, true}, options_.rounds);
   state.identity = together.solution.identity;
   for (std::size_t i = 0; i < some.size(); ++i) state.poses[some[i]] = together.solution.poses[i];
-  if (some.size() == frames.size() || together.termination == Termination::kCancelled) return together;
+  if (together.termination == Termination::kCancelled) return together;
   const auto alone =
       settled({state.identity, posesOf(state, frames)}, frames, terms, tightness, {true, false}, options_.rounds);
   state.identity = alone.solution.identity;

@@ -19,8 +19,8 @@ class ClothedSequence {
   std::size_t size() const { return frames_.size(); }
 
   /// The identity on some frames together with the postures of at most options.together of them, spread evenly: how
-  /// long a leg is and how far a knee bends under cloth hang together, and in turn each would wait for the other. Then,
-  /// where there are more, the identity on all with the postures held.
+  /// long a leg is and how far a knee bends under cloth hang together, and in turn each would wait for the other. Then
+  /// the identity on all of them with the postures held, which ends sooner: its outcome.
   Outcome settleIdentity(BodySequence& state, const std::vector<std::size_t>& frames, const ClothingTerms& terms,
                          const Eigen::VectorXd& tightness) const;
   /// The posture of one frame, the identity held.
