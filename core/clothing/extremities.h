@@ -20,11 +20,11 @@ std::vector<std::int32_t> extremitiesOf(std::span<const Limb> limbs);
 /// Seats one hand or foot by itself, the rest of the body held. Closest points leave a hand palm up, fingers folded, or
 /// on the wrong sheet of skin; so its joint is tried in a grid of turns (twists about the bone that leads to it and
 /// tilts) with what hangs below straight, and as it stands in some other poses, then its fingers or toes one by one;
-/// from the best ones a descent in these joints alone (PartFit).
+/// from the best ones a descent in these joints and, by a little, the one above (PartFit).
 ///
-/// joint: of extremitiesOf; others: poses of frames nearby; joints are drawn to the median of these and rest, so that
-/// what the scan does not show stays there. Returns whether `pose` was bettered; else it is left
-/// as it was. Throws InvalidInput naming an option.
+/// joint: of extremitiesOf; others: poses of frames nearby: joints are drawn to the median of these and rest, so that
+/// what the scan does not show stays there. Returns whether `pose` was bettered; else, and when stopped, it is left as
+/// it was. Throws InvalidInput naming an option.
 bool seatExtremity(const ScanSurface& scan, const BodyModel& model, const Eigen::VectorXd& identity, std::int32_t joint,
                    std::span<const Pose> others, Pose& pose, const ExtremityOptions& options = {},
                    const std::stop_token& stop = {});
