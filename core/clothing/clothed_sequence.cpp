@@ -10,9 +10,26 @@
 namespace shaped {
 namespace {
 
-constexpr double kBent = 0.35;  ///< rad: what fingers and toes may be by the noise of their few points
+/// At most so many of some frames, evenly.
+std::vector<std::size_t> spread(const std::vector<std::size_t>& frames, std::size_t most) {
+  std::vector<std::size_t> some;
+  const std::size_t count = std::min(most, frames.size());
+  for (std::size_t i = 0; i < count; ++i) some.push_back(frames[i * frames.size() / count]);
+  return some;
+}
+
+/// Whether a limb begins where another ends, as a forearm does: it is tried with that one.
+bool continuesOther(const Limb& limb, const std::vector<Limb>& limbs) {
+  return std::any_of(limbs.begin(), limbs.end(), [&](const Limb& other) { return other.lower == limb.upper; });
+}
 
 }  // namespace
+
+std::vector<Pose> posesOf(const BodySequence& state, const std::vector<std::size_t>& frames) {
+  std::vector<Pose> poses;
+  for (const auto f : frames) poses.push_back(state.poses[f]);
+  return poses;
+}
 
 ClothedSequence::ClothedSequence(const std::deque<ScanSurface>& scans, const BodyModel& model,
                                  std::span<const std::vector<Landmark>> landmarks, const ClothingOptions& options)
@@ -24,11 +41,16 @@ ClothedSequence::ClothedSequence(const std::deque<ScanSurface>& scans, const Bod
 
 Outcome ClothedSequence::settleIdentity(BodySequence& state, const std::vector<std::size_t>& frames,
                                         const ClothingTerms& terms, const Eigen::VectorXd& tightness) const {
-  BodySequence some{state.identity, {}};
-  for (const auto f : frames) some.poses.push_back(state.poses[f]);
-  const auto result = settled(std::move(some), frames, terms, tightness, {true, false}, options_.rounds);
-  state.identity = result.solution.identity;
-  return result;
+  const auto some = spread(frames, std::size_t(options_.together));
+  const auto together =
+      settled({state.identity, posesOf(state, some)}, some, terms, tightness, {true, true}, options_.rounds);
+  state.identity = together.solution.identity;
+  for (std::size_t i = 0; i < some.size(); ++i) state.poses[some[i]] = together.solution.poses[i];
+  if (together.termination == Termination::kCancelled) return together;
+  const auto alone =
+      settled({state.identity, posesOf(state, frames)}, frames, terms, tightness, {true, false}, options_.rounds);
+  state.identity = alone.solution.identity;
+  return alone;
 }
 
 Outcome ClothedSequence::settlePosture(BodySequence& state, std::size_t frame, const ClothingTerms& terms,
@@ -39,20 +61,13 @@ Outcome ClothedSequence::settlePosture(BodySequence& state, std::size_t frame, c
   return result;
 }
 
-void ClothedSequence::reseatLimbs(BodySequence& state, std::size_t frame, const std::vector<std::size_t>& neighbours,
+void ClothedSequence::reseatLimbs(BodySequence& state, std::size_t frame, std::span<const Pose> others,
                                   const ClothingTerms& terms, const Eigen::VectorXd& tightness) const {
-  std::vector<Pose> others;
-  for (const auto f : neighbours) others.push_back(state.poses[f]);
   const Vertices joints = model_.restJoints(state.identity);
   for (const auto& limb : limbs_)
-    keepBest(state, frame, otherLimbPoses(model_.skeleton(), joints, limb, state.poses[frame], others), terms,
-             tightness);
-}
-
-void ClothedSequence::straightenTips(BodySequence& state, std::size_t frame, const ClothingTerms& terms,
-                                     const Eigen::VectorXd& tightness) const {
-  for (const auto& limb : limbs_)
-    keepBest(state, frame, straightenedTips(model_.skeleton(), limb, state.poses[frame], kBent), terms, tightness);
+    if (!continuesOther(limb, limbs_))
+      keepBest(state, frame, otherLimbPoses(model_.skeleton(), joints, limb, state.poses[frame], others), terms,
+               tightness);
 }
 
 void ClothedSequence::searchLimbs(BodySequence& state, std::size_t frame, const ClothingTerms& terms,
@@ -68,6 +83,15 @@ void ClothedSequence::searchLimbs(BodySequence& state, std::size_t frame, const 
           shaped::searchLimbs(scans_[frame], model_, {state.identity, start}, search, options_.stop).state.pose);
   }
   keepBest(state, frame, starts, terms, tightness);
+  reseatLimbs(state, frame, starts, terms, tightness);
+}
+
+void ClothedSequence::seatExtremities(BodySequence& state, std::size_t frame,
+                                      const std::vector<std::size_t>& neighbours) const {
+  const auto others = posesOf(state, neighbours);
+  for (const auto joint : extremitiesOf(limbs_))
+    seatExtremity(scans_[frame], model_, state.identity, joint, others, state.poses[frame], options_.extremities,
+                  options_.stop);
 }
 
 void ClothedSequence::keepBest(BodySequence& state, std::size_t frame, std::span<const Pose> starts,

@@ -6,6 +6,9 @@
 
 namespace shaped {
 
+/// The poses of some frames.
+std::vector<Pose> posesOf(const BodySequence& state, const std::vector<std::size_t>& frames);
+
 /// The frames of a dressed person, and the steps that minimise (10.1) over them.
 class ClothedSequence {
  public:
@@ -15,22 +18,23 @@ class ClothedSequence {
 
   std::size_t size() const { return frames_.size(); }
 
-  /// The identity on some frames, their postures held.
+  /// The identity on some frames together with the postures of at most options.together of them, spread evenly: how
+  /// long a leg is and how far a knee bends under cloth hang together, and in turn each would wait for the other. Then
+  /// the identity on all of them with the postures held, which ends sooner: its outcome.
   Outcome settleIdentity(BodySequence& state, const std::vector<std::size_t>& frames, const ClothingTerms& terms,
                          const Eigen::VectorXd& tightness) const;
   /// The posture of one frame, the identity held.
   Outcome settlePosture(BodySequence& state, std::size_t frame, const ClothingTerms& terms,
                         const Eigen::VectorXd& tightness) const;
-  /// Tries limbs of one frame in other ways (otherLimbPoses, with those of `neighbours`) and keeps what lies better.
-  void reseatLimbs(BodySequence& state, std::size_t frame, const std::vector<std::size_t>& neighbours,
-                   const ClothingTerms& terms, const Eigen::VectorXd& tightness) const;
-
-  /// The same with hands and feet, joint by joint, as at rest (straightenedTips).
-  void straightenTips(BodySequence& state, std::size_t frame, const ClothingTerms& terms,
-                      const Eigen::VectorXd& tightness) const;
-  /// The same with the limbs as a search over all their turns seats them.
+  /// Tries limbs of one frame in other ways (otherLimbPoses, with those of `others`) and keeps what lies better.
+  void reseatLimbs(BodySequence& state, std::size_t frame, std::span<const Pose> others, const ClothingTerms& terms,
+                   const Eigen::VectorXd& tightness) const;
+  /// The same with the limbs as a search over all their turns seats them: all at once, then one by one, as it may find
+  /// an arm and lose a leg.
   void searchLimbs(BodySequence& state, std::size_t frame, const ClothingTerms& terms,
                    const Eigen::VectorXd& tightness) const;
+  /// Seats hands and feet of one frame by themselves (seatExtremity), drawn to how they stand in `neighbours`.
+  void seatExtremities(BodySequence& state, std::size_t frame, const std::vector<std::size_t>& neighbours) const;
 
   /// How much each vertex that takes part may be believed to be skin, or cloth drawn tight: by how little its gap
   /// varies over some frames, (s^2 / (s^2 + variance))^2 with s the option tight_spread, relative to the tightest

@@ -35,14 +35,4 @@ std::vector<Pose> otherLimbPoses(const Skeleton& skeleton, const Vertices& rest_
   return poses;
 }
 
-std::vector<Pose> straightenedTips(const Skeleton& skeleton, const Limb& limb, const Pose& pose, double bent) {
-  std::vector<Pose> poses;
-  for (std::int32_t j = limb.lower + 1; j < skeleton.jointCount(); ++j) {
-    if (!hangsBelow(skeleton, j, limb.lower) || pose.rotations.row(j).norm() <= bent) continue;
-    poses.push_back(pose);
-    straighten(skeleton, j, poses.back());
-  }
-  return poses;
-}
-
 }  // namespace shaped

@@ -16,8 +16,4 @@ void straighten(const Skeleton& skeleton, std::int32_t joint, Pose& pose);
 std::vector<Pose> otherLimbPoses(const Skeleton& skeleton, const Vertices& rest_joints, const Limb& limb,
                                  const Pose& pose, std::span<const Pose> others);
 
-/// Other ways in which the far end of a limb may stand: each joint below its lower one that is bent by more than
-/// `bent` (rad), with all that hangs below, as at rest (a hand whose fingers a descent has folded).
-std::vector<Pose> straightenedTips(const Skeleton& skeleton, const Limb& limb, const Pose& pose, double bent);
-
 }  // namespace shaped

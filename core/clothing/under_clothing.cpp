@@ -60,9 +60,10 @@ class Estimation {
       static_cast<Outcome&>(result) = sequence_.settleIdentity(state_, trusted_, termsOf(pass), tightness);
       ClothingTerms postures = termsOf(pass);
       postures.loss_scale = options_.posture_loss_scale;
-      if (pass == std::min(1, options_.passes - 1)) reseat(postures, tightness);
-      if (pass == options_.passes - 1) straightenTips(postures, tightness);
+      const bool second = pass == std::min(1, options_.passes - 1), last = pass == options_.passes - 1;
+      if (second) reseat(postures, tightness);
       settlePostures(postures, tightness);
+      if (second || last) seatExtremities();
       if (options_.stop.stop_requested()) result.termination = Termination::kCancelled;
       if (result.termination == Termination::kCancelled) return result;  // measuring would take long
       if (pass > 0)
@@ -94,7 +95,7 @@ class Estimation {
   void reseat(const ClothingTerms& terms, const Eigen::VectorXd& tightness) {
     for (std::size_t f = 0; f < sequence_.size() && !options_.stop.stop_requested(); ++f) {
       tell(options_, "limbs of frame " + std::to_string(f + 1), 0.6 + 0.1 * double(f) / double(sequence_.size()));
-      sequence_.reseatLimbs(state_, f, nearest(f), terms, tightness);
+      sequence_.reseatLimbs(state_, f, posesOf(state_, nearest(f)), terms, tightness);
       const bool missed = std::find(trusted_.begin(), trusted_.end(), f) == trusted_.end();
       if (missed) sequence_.searchLimbs(state_, f, terms, tightness);
     }
@@ -105,9 +106,10 @@ class Estimation {
       if (frames[f].trusted) trusted_.push_back(f);
   }
 
-  void straightenTips(const ClothingTerms& terms, const Eigen::VectorXd& tightness) {
+  /// Hands and feet by themselves: closest points of the whole body leave them on the wrong sheet.
+  void seatExtremities() {
     for (std::size_t f = 0; f < sequence_.size() && !options_.stop.stop_requested(); ++f)
-      sequence_.straightenTips(state_, f, terms, tightness);
+      sequence_.seatExtremities(state_, f, nearest(f));
   }
 
   /// The trusted frames nearest in time.
@@ -155,6 +157,7 @@ std::optional<std::string> ClothingOptions::firstViolation() const {
   if (points < 50) return "points = " + std::to_string(points) + ", want >= 50";
   if (rounds < 1) return "rounds = " + std::to_string(rounds) + ", want >= 1";
   if (first_modes < 1) return "first_modes = " + std::to_string(first_modes) + ", want >= 1";
+  if (together < 1) return "together = " + std::to_string(together) + ", want >= 1";
   if (passes < 1) return "passes = " + std::to_string(passes) + ", want >= 1";
   for (const auto& [name, weights] : {std::pair{"first", first}, {"last", last}})
     for (const double weight : {weights.landmarks, weights.data, weights.cloth})
@@ -177,6 +180,7 @@ std::optional<std::string> ClothingOptions::firstViolation() const {
   for (const auto& [name, share] : {std::pair{"good_share", good_share}, {"explained_share", explained_share}})
     if (!(share >= 0 && share <= 1)) return std::string(name) + " = " + std::to_string(share) + ", want 0 to 1";
   if (auto problem = limbs.firstViolation()) return "limbs." + *problem;
+  if (auto problem = extremities.firstViolation()) return "extremities." + *problem;
   return registration.firstViolation();
 }
 

@@ -6,6 +6,7 @@
 #include <string>
 #include <vector>
 
+#include "core/clothing/extremities.h"
 #include "core/mesh/scan.h"
 #include "core/numerics/progress.h"
 #include "core/registration/limb_search.h"
@@ -44,10 +45,12 @@ struct ClothingOptions {
   double explained_share = 0.99;  ///< of the best frame's `explained`: a frame that has less is not trusted, 0 to 1
   int points = 3000;              ///< of the model that take part, >= 50
   int rounds = 8;                 ///< closest points are renewed at most so often in a step, >= 1
+  int together = 8;               ///< frames whose postures move with the identity; effort grows with its cube, >= 1
   int passes = 6;                 ///< identity and postures in turn, >= 1
   double tolerance = 2e-4;        ///< of a round: root mean square motion of the surface, m, > 0
   ScanRegistrationOptions registration = clothedRegistration();  ///< of first fits
   LimbSearchOptions limbs;                                       ///< of first fits
+  ExtremityOptions extremities;                                  ///< of hands and feet, at last
   std::stop_token stop = {};
   ProgressSink progress = {};
 
@@ -75,14 +78,15 @@ struct ClothedBody {
 /// The body of a dressed person out of raw scans of a motion: one identity, a posture a frame, by minimising
 ///   E = sum over frames of omega_lnd E_lnd + omega_data E_data + omega_cloth E_cloth      (10.1) of [Wuh18]
 /// with E_data the robust squared distance of the body's points to the scan and E_cloth that of the points outside it.
-/// Postures with the identity held and the identity with the postures held, in turn, the cloth's weight rising and the
-/// data's loss narrowing from pass to pass.
+/// The identity together with the postures of some frames, and the postures with the identity held, in turn, the
+/// cloth's weight rising and the data's loss narrowing from pass to pass.
 ///
-/// Ours: first postures come from fits of each scan by itself (FirstFits), then limb by limb also from frames nearby,
-/// at last with folded fingers and toes straight. And the data of a point inside counts by how little its gap varies
-/// over the frames: naked skin keeps its distance, cloth comes and goes. So head, hands and feet tell who it is, cloth
-/// only where the body must not be, and in between the identity prior decides. That takes three frames or more; with
-/// fewer all points count alike, and the body under loose cloth comes out too large.
+/// Ours: first postures come from fits of each scan by itself (FirstFits), then limb by limb also from frames nearby;
+/// hands and feet, which are taken to be bare, are seated by themselves (seatExtremity). And the data of a point inside
+/// counts by how little its gap varies over the frames: naked skin keeps its distance, cloth comes and goes. So head,
+/// hands and feet tell who it is, cloth only where the body must not be, and in between the identity prior decides.
+/// That takes three frames or more; with fewer all points count alike, and the body under loose cloth comes out too
+/// large.
 ///
 /// scans: at least one, in the order of the motion; each may lie anywhere. landmarks: one list a frame, or none at all.
 /// The outcome is the last identity's; a body that was cancelled has neither identity nor frames. Throws InvalidInput

@@ -4,11 +4,11 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
-#include <numbers>
 
 #include "core/mesh/quality.h"
 #include "core/numerics/error.h"
 #include "core/numerics/option_checks.h"
+#include "core/registration/bone_turns.h"
 #include "core/registration/deformation.h"
 #include "core/registration/surface_samples.h"
 #include "core/skeleton/rotation.h"
@@ -17,7 +17,6 @@
 namespace shaped {
 namespace {
 
-constexpr double kDegree = std::numbers::pi / 180;
 constexpr int kDensity = 4;          ///< both sides are sampled so much denser than the rest of the body is read
 constexpr int kLimbPoints = 60;      ///< of each of a limb's two parts: small parts tell as much as large ones
 constexpr int kScanPoints = 120;     ///< of the scan that a limb has to explain
@@ -36,22 +35,6 @@ struct Points {
     return result;
   }
 };
-
-/// Rotations that tilt a bone by the angles in eight directions, each after every twist about it; the identity first.
-std::vector<Eigen::Matrix3d> turnsOf(const Eigen::Vector3d& bone, const std::vector<double>& tilts,
-                                     const std::vector<double>& twists) {
-  const Eigen::Vector3d axis = bone.normalized(), across = axis.unitOrthogonal();
-  std::vector<Eigen::Matrix3d> turns;
-  for (const double twist : twists) {
-    const Eigen::Matrix3d twisted = rotationMatrix(twist * kDegree * axis);
-    turns.push_back(twisted);
-    for (const double tilt : tilts)
-      for (int direction = 0; direction < 8; ++direction)
-        turns.push_back(rotationMatrix(tilt * kDegree * (rotationMatrix(45 * direction * kDegree * axis) * across)) *
-                        twisted);
-  }
-  return turns;
-}
 
 /// The tree of joints as the search sees it: who carries what.
 class Limbs {
@@ -295,8 +278,8 @@ class Search {
     const Eigen::Vector3d bone = cut.above.transpose() * cut.bone;
     const Eigen::Vector3d forearm =
         cut.above.transpose() * (cut.lower.positions.rowwise().mean() - cut.shoulder - cut.bone);
-    const auto lowers = turnsOf(forearm, {45, 90}, {0});
-    for (const auto& upper : turnsOf(bone, {35, 70}, {0, -50, 50})) tryLower(limb, cut, upper, lowers, least, best);
+    const auto lowers = boneTurns(forearm, {45, 90}, {0});
+    for (const auto& upper : boneTurns(bone, {35, 70}, {0, -50, 50})) tryLower(limb, cut, upper, lowers, least, best);
     for (const double step : {22.0, 11.0}) refine(limb, cut, bone, forearm, step, least, best);
     if (stop_.stop_requested() || !(least < first - options_.least_gain)) return false;
     state.pose.rotations.row(limb.upper) = axisAngle(best.upper).transpose();
@@ -309,8 +292,8 @@ class Search {
               double step, double& least, Turn& best) const {
     const Turn centre = best;
     std::vector<Eigen::Matrix3d> lowers;
-    for (const auto& small : turnsOf(forearm, {step}, {0})) lowers.push_back(centre.lower * small);
-    for (const auto& small : turnsOf(bone, {step}, {0, -step, step}))
+    for (const auto& small : boneTurns(forearm, {step}, {0})) lowers.push_back(centre.lower * small);
+    for (const auto& small : boneTurns(bone, {step}, {0, -step, step}))
       tryLower(limb, cut, centre.upper * small, lowers, least, best);
   }
 

@@ -54,15 +54,6 @@ void blissFaces() {
   Random random(29);
   auto options = growthOptions();
   options.scanner = scannerFor(boundingBoxDiagonal(neutral));
-  if (setting("SHAPED_SCALED", 0)) {
-    const double factor = boundingBoxDiagonal(neutral) / 2;
-    for (auto& level : options.registration.fit.levels) {
-      level.max_distance *= factor;
-      level.loss_scale *= factor;
-      level.sigma *= factor;
-    }
-    options.registration.fit.tolerance *= factor;
-  }
   std::vector<Vertices> known;
   for (int i = 0; i < 20; ++i) known.push_back(persons.draw(random));
   const auto scanned = [&](const Vertices& face) {

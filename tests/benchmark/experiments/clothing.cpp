@@ -2,81 +2,74 @@
 
 #include <cstdlib>
 #include <filesystem>
-#include <nlohmann/json.hpp>
 
-#include "core/io/file.h"
 #include "core/io/mesh_file.h"
-#include "core/io/scan_file.h"
 #include "core/mesh/alignment.h"
 #include "core/mesh/quality.h"
-#include "core/surface/closest_point.h"
-#include "tests/benchmark/experiments/body_data.h"
+#include "tests/benchmark/experiments/clothed_data.h"
 #include "tests/benchmark/experiments/experiment.h"
 #include "tests/benchmark/experiments/timing.h"
 
 namespace shaped::experiments {
 namespace {
 
-struct ClothedData {
-  std::vector<Scan> scans;
-  std::vector<Vertices> bodies;   ///< under the cloth, in the scan's place
-  std::vector<double> thickness;  ///< of the cloth over trunk and legs, median, m
-  Vertices rest;
-};
-
-ClothedData clothedData() {
-  const auto truth = nlohmann::json::parse(readFile(dataPath("body_scans/scans.json")));
-  ClothedData data;
-  for (const auto& entry : truth.at("clothed")) {
-    RigidMotion motion;
-    for (int r = 0; r < 3; ++r) {
-      motion.translation[r] = entry.at("t").at(std::size_t(r));
-      for (int c = 0; c < 3; ++c) motion.rotation(r, c) = entry.at("R").at(std::size_t(r)).at(std::size_t(c));
-    }
-    data.scans.push_back(readScan(dataPath("body_scans/" + entry.at("scan").get<std::string>())));
-    data.bodies.push_back(
-        apply(motion, readMesh(dataPath("body_scans/" + entry.at("gt").get<std::string>())).vertices));
-    data.thickness.push_back(entry.at("offset_m").at("trunk_legs_median"));
-  }
-  data.rest = readMesh(dataPath("body_scans/clothed/rest_gt.ply")).vertices;
-  return data;
-}
-
-}  // namespace
-
-void clothing() {
-  Report report("Body under clothing: 8 frames of a walk, cloth of 1 to 6 cm");
-  const OneThread one_thread;
-  const auto data = bodyData();
+/// A model of the 80 bodies that no scan shows.
+BodyModel clothingModel(const BodyData& data) {
   std::vector<Vertices> training;
   for (const std::size_t i : data.others) training.push_back(data.rest[i]);
   BodyTrainingOptions options;
   options.posture = PostureNormalisation::kNone;
   options.modes = 40;
-  const BodyModel model = trainBody(data.reference, training, options)->model;
-  const auto clothed = clothedData();
+  return trainBody(data.reference, training, options)->model;
+}
+
+void tellFrame(Report& report, const BodyModel& model, const ClothedBody& found, const ClothedData& clothed,
+               std::size_t f) {
+  const auto& frame = found.frames[f];
+  const double error = meanVertexDistance(model.posed({found.identity, frame.pose}).vertices(), clothed.bodies[f]);
+  report.entry(text("frame %zu: v2v; cloth, median; %s", f, name(frame.outcome.termination).data()),
+               text("%.1f mm; %.1f mm", 1000 * error, 1000 * clothed.thickness[f]), "v2v < half the cloth",
+               error < 0.5 * clothed.thickness[f]);
+  report.entry(
+      text("frame %zu (%s): inside or within 3 mm; strictly; mean gap", f, frame.trusted ? "trusted" : "doubtful"),
+      text("%.1f %%; %.1f %%; %.1f mm", 100 * frame.inside, 100 * frame.inside_strictly, 1000 * frame.mean_gap),
+      "98 % inside", frame.inside >= 0.98);
+}
+
+/// Bodies of a sequence into the folder that CLOTHING_MESHES names.
+void writeBodies(const std::string& sequence, const BodyModel& model, const ClothedBody& found) {
+  const char* folder = std::getenv("CLOTHING_MESHES");
+  if (!folder) return;
+  for (std::size_t f = 0; f < found.frames.size(); ++f)
+    writeMesh(std::filesystem::path(folder) / text("%s_%zu.ply", sequence.c_str(), f),
+              model.posed({found.identity, found.frames[f].pose}).vertices(), model.topology()->faces());
+}
+
+/// One section of the report; SHAPED_CLOTHED names the only sequence that is wanted, "walk" or "run".
+void clothedSequence(const std::string& sequence, const BodyModel& model, const ClothedData& clothed) {
+  Report report("Body under clothing: " + std::to_string(clothed.scans.size()) + " frames of a " + sequence +
+                ", cloth of 1 to 6 cm");
   const Stopwatch watch;
   const auto result = estimateUnderClothing(clothed.scans, model, {});
   const double seconds = watch.cpu();
-  for (std::size_t f = 0; f < clothed.scans.size(); ++f) {
-    const auto& frame = result.solution.frames[f];
-    const double error =
-        meanVertexDistance(model.posed({result.solution.identity, frame.pose}).vertices(), clothed.bodies[f]);
-    report.entry(text("frame %zu: v2v; cloth, median; %s", f, name(frame.outcome.termination).data()),
-                 text("%.1f mm; %.1f mm", 1000 * error, 1000 * clothed.thickness[f]), "v2v < half the cloth",
-                 error < 0.5 * clothed.thickness[f]);
-    report.entry(
-        text("frame %zu (%s): inside or within 3 mm; strictly; mean gap", f, frame.trusted ? "trusted" : "doubtful"),
-        text("%.1f %%; %.1f %%; %.1f mm", 100 * frame.inside, 100 * frame.inside_strictly, 1000 * frame.mean_gap),
-        "98 % inside", frame.inside >= 0.98);
-    if (const char* folder = std::getenv("CLOTHING_MESHES"))
-      writeMesh(std::filesystem::path(folder) / text("body_%zu.ply", f),
-                model.posed({result.solution.identity, frame.pose}).vertices(), model.topology()->faces());
-  }
+  for (std::size_t f = 0; f < clothed.scans.size(); ++f) tellFrame(report, model, result.solution, clothed, f);
+  writeBodies(sequence, model, result.solution);
   const Vertices rest = model.rest(result.solution.identity);
   report.entry("identity at rest: v2v",
                text("%.1f mm", 1000 * meanVertexDistance(apply(alignRigidly(rest, clothed.rest), rest), clothed.rest)));
   report.entry("the end; CPU s", text("%s, %.1f", name(result.termination).data(), seconds));
+}
+
+}  // namespace
+
+void clothing() {
+  const OneThread one_thread;
+  const auto data = bodyData();
+  const BodyModel model = clothingModel(data);
+  const char* only = std::getenv("SHAPED_CLOTHED");
+  const auto wanted = [&](const std::string& sequence) { return !only || sequence == only; };
+  if (wanted("walk")) clothedSequence("walk", model, clothedWalk());
+  if (wanted("run")) clothedSequence("run", model, clothedRun(data));
 }
 
 }  // namespace shaped::experiments

@@ -18,34 +18,10 @@ const Skeleton kArm({{"trunk", -1},
                      {"fingertip", 4},
                      {"thumb", 3},
                      {"head", 0}});
-constexpr std::int32_t kForearm = 2, kHand = 3, kFinger = 4, kTip = 5, kThumb = 6, kHead = 7;
+constexpr std::int32_t kForearm = 2, kHead = 7;
 constexpr Limb kLimb{1, kForearm};
 
 }  // namespace
-
-TEST_CASE("tips that are bent are put to rest one by one, with what hangs below them") {
-  Pose pose = randomPose(kArm, 0.2, 1);
-  pose.rotations.row(kFinger) << 1, 0, 0;
-  pose.rotations.row(kThumb) << 0, -0.5, 0;
-  pose.rotations.row(kForearm) << 0, 0, 2;  // the limb's own joints bend as they like
-  pose.rotations.row(kHead) << 0, 0, 2;
-  const auto poses = straightenedTips(kArm, kLimb, pose, 0.35);
-  REQUIRE(poses.size() == 2);
-  Pose expected = pose;
-  expected.rotations.row(kFinger).setZero();
-  expected.rotations.row(kTip).setZero();
-  CHECK(poses[0].rotations == expected.rotations);
-  CHECK(poses[0].translation == pose.translation);
-  expected = pose;
-  expected.rotations.row(kThumb).setZero();
-  CHECK(poses[1].rotations == expected.rotations);
-
-  pose.rotations.row(kHand) << 0.4, 0, 0;
-  const auto with_hand = straightenedTips(kArm, kLimb, pose, 0.35);
-  REQUIRE(with_hand.size() == 3);
-  CHECK(with_hand[0].rotations.middleRows<4>(kHand).isZero(0));
-  CHECK(straightenedTips(kArm, kLimb, restPose(kArm), 0.35).empty());
-}
 
 TEST_CASE("a limb's other ways are its lower part at rest, untwisted, and as others hold it") {
   const Pose pose = randomPose(kArm, 0.5, 2), other = randomPose(kArm, 0.5, 3);

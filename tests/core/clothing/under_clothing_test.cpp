@@ -87,8 +87,9 @@ TEST_CASE("the body under moving cloth lies within it, nearer to the truth than 
   CHECK(meanInside(estimateUnderClothing(tube.scans, tube.model, tube.landmarks, plain).solution) < meanInside(found));
 }
 
-// Known gap: on this tube, whose landmarks lie on the true body, one frame finds the identity better (5.0 mm) than four
-// do (8.2 mm), with other values of tight_spread too (0.008 and 0.03: 6.8 and 6.3 mm). Not understood yet.
+// Known gap: on this tube, whose landmarks lie on the true body, one frame finds the identity better (4.9 mm) than four
+// do (8.2 mm), with other values of tight_spread too (0.008 and 0.03: 6.8 and 6.3 mm). Without the identity's last step
+// alone, postures held, four do better than one; but then it never comes to rest.
 TEST_CASE("more frames tell more of what is under the cloth", "[!shouldfail]") {
   const DressedTube tube(4);
   const auto misfit = [&](std::size_t frames) {
@@ -96,6 +97,15 @@ TEST_CASE("more frames tell more of what is under the cloth", "[!shouldfail]") {
     return meanVertexDistance(tube.model.rest(found.solution.identity), tube.model.rest(tube.identity));
   };
   CHECK(misfit(4) < misfit(1));
+}
+
+TEST_CASE("where only some postures move with the identity, the others still count") {
+  const DressedTube tube(4);
+  ClothingOptions options;
+  options.together = 2;
+  const auto found = estimateUnderClothing(tube.scans, tube.model, tube.landmarks, options).solution;
+  CHECK(tube.error(found) < 0.25 * tube.thickness);
+  CHECK(meanInside(found) >= 0.95);
 }
 
 TEST_CASE("estimating under clothing refuses what it cannot read, and stops when asked to") {
@@ -117,6 +127,14 @@ TEST_CASE("estimating under clothing refuses what it cannot read, and stops when
   options.retries = 0;  // a frame that was not fitted alone would have no posture
   CHECK_THROWS_WITH(estimateUnderClothing(tube.scans, tube.model, {}, options),
                     Catch::Contains("retries = 0, want >= 1"));
+  options = {};
+  options.together = 0;
+  CHECK_THROWS_WITH(estimateUnderClothing(tube.scans, tube.model, {}, options),
+                    Catch::Contains("together = 0, want >= 1"));
+  options = {};
+  options.extremities.fit.rounds = 0;
+  CHECK_THROWS_WITH(estimateUnderClothing(tube.scans, tube.model, {}, options),
+                    Catch::Contains("extremities.fit.rounds = 0, want >= 1"));
   std::stop_source source;
   source.request_stop();
   options = {};
