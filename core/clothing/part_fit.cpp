@@ -268,8 +268,9 @@ void PartFit::keepLimits(Pose& pose) const {
 }
 
 Pose PartFit::descended(const Pose& start) const {
-  Pose pose = start, best;
+  Pose pose = start;
   keepLimits(pose);
+  Pose best = pose;
   double least = std::numeric_limits<double>::infinity();
   for (int round = 0; round <= options_.rounds; ++round) {
     const PosedSkin skin = skinOf(pose);

@@ -26,10 +26,9 @@ struct PartFitOptions {
 };
 
 /// A part of the body that hangs below one joint, against the scan near it; the rest of the body holds still, but that
-/// the joint above may give way by a little. For bare
-/// skin: points on either side count alike. Partners are nearest in place and normal together, both ways, from the
-/// part to the scan and back, so that neither a finger in the air nor one that the body lacks goes unseen, and the two
-/// sides of a hand are told apart.
+/// the joint above may give way by a little. For bare skin: points on either side count alike. Partners are nearest in
+/// place and normal together, both ways, from the part to the scan and back, so that neither a finger in the air nor
+/// one that the body lacks goes unseen, and the two sides of a hand are told apart.
 class PartFit {
  public:
   /// All must outlive it. pose: where the rest of the body stands; likely: what the part's joints are drawn to where
