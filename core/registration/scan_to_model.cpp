@@ -20,8 +20,8 @@ BodyFitOptions fitOptions(const ModelFitOptions& options, const ModelFitLevel& l
   fit.observations = options.observations;
   fit.pose_deviation = options.pose_deviation;
   fit.identity = options.identity;
-  // The pairs are renewed at once: a few steps on the old ones are enough, and fewer near the answer.
-  fit.max_iterations = level.to_planes ? 2 : 3;
+  // The pairs are renewed at once: a few steps on the old ones are enough. With two, people in motion were missed.
+  fit.max_iterations = 3;
   fit.tolerance = 1e-7;  // a step not worth taking would pass for a surface at rest
   fit.stop = options.stop;
   return fit;
