@@ -44,9 +44,9 @@ class PartFit {
   /// Mean robust cost both ways and that of the joints' turns; 0 to 2 and the latter.
   double cost(const Pose& pose) const;
 
-  /// The pose after descending in the part's joints alone: damped Gauss-Newton steps on the distances along the scan's
-  /// normals under a loss that narrows (Geman and McClure), partners found anew before each; the best by cost() of all
-  /// it came by, within the joints' limits.
+  /// The pose after descending in the part's joints and, by a little, the one above: damped Gauss-Newton steps on the
+  /// distances along the scan's normals under a loss that narrows (Geman and McClure), partners found anew before each;
+  /// the best by cost() of all it came by, within the joints' limits. Where none has a finite cost: the start.
   Pose descended(const Pose& start) const;
 
  private:

@@ -29,16 +29,20 @@ std::filesystem::path rigPath() {
 
 TrueScan trueScan(int index, const nlohmann::json& truth) {
   const auto& entry = truth.at("scans").at(std::size_t(index));
+  const auto file = text("body_scans/scan_%02d.ply", index), body = text("body_scans/gt/scan_%02d_gt.ply", index);
+  return {readScan(dataPath(file)), apply(motionOf(entry), readMesh(dataPath(body)).vertices), entry.at("identity")};
+}
+
+}  // namespace
+
+RigidMotion motionOf(const nlohmann::json& entry) {
   RigidMotion motion;
   for (int r = 0; r < 3; ++r) {
     motion.translation[r] = entry.at("t").at(std::size_t(r));
     for (int c = 0; c < 3; ++c) motion.rotation(r, c) = entry.at("R").at(std::size_t(r)).at(std::size_t(c));
   }
-  const auto file = text("body_scans/scan_%02d.ply", index), body = text("body_scans/gt/scan_%02d_gt.ply", index);
-  return {readScan(dataPath(file)), apply(motion, readMesh(dataPath(body)).vertices), entry.at("identity")};
+  return motion;
 }
-
-}  // namespace
 
 BodyData bodyData() {
   const auto mesh = readMesh(dataPath("body_identities/template.ply"));

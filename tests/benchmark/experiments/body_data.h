@@ -1,8 +1,10 @@
 #pragma once
 
 #include <cstdint>
+#include <nlohmann/json.hpp>
 
 #include "core/body/body_training.h"
+#include "core/mesh/alignment.h"
 #include "core/mesh/scan.h"
 #include "tests/benchmark/experiments/data.h"
 
@@ -21,6 +23,9 @@ struct BodyData {
 /// Reads them. The rig file is the one that SHAPED_RIG names (default /tmp/rig/body_full.json), made by
 ///   tests/support/rig_from_data.py posed_body ~/.cache/shaped-data/posed_body /tmp/rig/body_full.json
 BodyData bodyData();
+
+/// How an entry of scans.json places its body: `R`, a 3 x 3 rotation, and `t`, m.
+RigidMotion motionOf(const nlohmann::json& entry);
 
 /// A raw scan with what it was made from.
 struct TrueScan {

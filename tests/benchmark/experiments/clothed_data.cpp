@@ -74,14 +74,9 @@ ClothedData clothedWalk() {
   const auto truth = nlohmann::json::parse(readFile(dataPath("body_scans/scans.json")));
   ClothedData data;
   for (const auto& entry : truth.at("clothed")) {
-    RigidMotion motion;
-    for (int r = 0; r < 3; ++r) {
-      motion.translation[r] = entry.at("t").at(std::size_t(r));
-      for (int c = 0; c < 3; ++c) motion.rotation(r, c) = entry.at("R").at(std::size_t(r)).at(std::size_t(c));
-    }
     data.scans.push_back(readScan(dataPath("body_scans/" + entry.at("scan").get<std::string>())));
     data.bodies.push_back(
-        apply(motion, readMesh(dataPath("body_scans/" + entry.at("gt").get<std::string>())).vertices));
+        apply(motionOf(entry), readMesh(dataPath("body_scans/" + entry.at("gt").get<std::string>())).vertices));
     data.thickness.push_back(entry.at("offset_m").at("trunk_legs_median"));
   }
   data.rest = readMesh(dataPath("body_scans/clothed/rest_gt.ply")).vertices;
