@@ -27,24 +27,31 @@ void requireTargets(std::span<const SurfaceTarget> targets, std::int32_t vertex_
   }
 }
 
-/// Ends the solver when the stop token fires.
-class StopCallback : public ceres::IterationCallback {
+/// Ends the solver when the stop token fires, and tells how far it is.
+class SolverWatch : public ceres::IterationCallback {
  public:
-  explicit StopCallback(std::stop_token stop) : stop_(std::move(stop)) {}
-  ceres::CallbackReturnType operator()(const ceres::IterationSummary&) override {
-    return stop_.stop_requested() ? ceres::SOLVER_ABORT : ceres::SOLVER_CONTINUE;
+  SolverWatch(std::stop_token stop, int max_iterations) : stop_(std::move(stop)), max_iterations_(max_iterations) {}
+
+  ceres::CallbackReturnType operator()(const ceres::IterationSummary& iteration) override {
+    done_ = iteration.iteration;
+    return stopped() ? ceres::SOLVER_ABORT : ceres::SOLVER_CONTINUE;
   }
+
+  bool stopped() const { return stop_.stop_requested(); }
+  /// Whether the step that is under way is the last, whatever it brings.
+  bool inLastStep() const { return done_ + 1 >= max_iterations_; }
 
  private:
   std::stop_token stop_;
+  int max_iterations_, done_ = -1;
 };
 
 /// The energy as Ceres sees it: of [J r] only its square root, the triangular factor, with one row more than there are
 /// parameters. It has the same steps, gradients and costs, and spares Ceres the work on thousands of rows.
 class Cost : public ceres::CostFunction {
  public:
-  Cost(const BodyModel& model, const BodyResiduals& residuals, std::stop_token stop)
-      : model_(model), residuals_(residuals), stop_(std::move(stop)) {
+  Cost(const BodyModel& model, const BodyResiduals& residuals, const SolverWatch& watch)
+      : model_(model), residuals_(residuals), watch_(watch) {
     set_num_residuals(int(residuals.parameterCount()) + 1);
     *mutable_parameter_block_sizes() = {int(model.modeCount()), 6};
     if (const int joints = 3 * model.skeleton().jointCount() - 3; joints > 0)
@@ -52,18 +59,21 @@ class Cost : public ceres::CostFunction {
   }
 
   bool Evaluate(double const* const* parameters, double* values, double** jacobians) const override {
-    if (stop_.stop_requested()) return stopped(values, jacobians);
+    if (watch_.stopped()) return stopped(values, jacobians);
     const BodyState state = stateOf(parameters);
     if (!state.identity.allFinite() || !state.pose.translation.allFinite() || !state.pose.rotations.allFinite())
       return false;
     const Eigen::Index n = residuals_.parameterCount();
     Eigen::Map<Eigen::VectorXd> residual(values, n + 1);
-    if (!jacobians) {
+    if (!jacobians || watch_.inLastStep()) {
       residual.setZero();
-      residual[0] = std::sqrt(residuals_.energy(state));
+      residual[0] = std::sqrt(residuals_.energy(state, skinOf(state)));
+      // Ceres asks for derivatives after the last step, too, and takes no step by them: of three steps they are a
+      // quarter of the work.
+      if (jacobians) setZero(jacobians);
       return true;
     }
-    const Eigen::LDLT<Eigen::MatrixXd> factor(residuals_.squares(state));
+    const Eigen::LDLT<Eigen::MatrixXd> factor(residuals_.squares(state, skinOf(state)));
     // Of P^T L D L^T P: sqrt(D) L^T P. Pivoted, as the energy may leave a direction open.
     Eigen::MatrixXd root = factor.transpositionsP() * Eigen::MatrixXd::Identity(n + 1, n + 1);
     root = factor.vectorD().cwiseMax(0).cwiseSqrt().asDiagonal() * (factor.matrixU() * root);
@@ -84,9 +94,13 @@ class Cost : public ceres::CostFunction {
   bool stopped(double* values, double** jacobians) const {
     if (!jacobians) return false;
     std::fill_n(values, num_residuals(), 0.0);
+    setZero(jacobians);
+    return true;
+  }
+
+  void setZero(double** jacobians) const {
     for (std::size_t block = 0; block < parameter_block_sizes().size(); ++block)
       if (jacobians[block]) std::fill_n(jacobians[block], num_residuals() * parameter_block_sizes()[block], 0.0);
-    return true;
   }
 
   BodyState stateOf(double const* const* parameters) const {
@@ -99,9 +113,19 @@ class Cost : public ceres::CostFunction {
     return state;
   }
 
+  /// The last is kept: Ceres asks for derivatives where it has just asked for the cost.
+  const PosedSkin& skinOf(const BodyState& state) const {
+    const bool same = skin_ && state.identity == of_.identity && toVector(state.pose) == toVector(of_.pose);
+    if (!same) skin_.emplace(model_.posed(state));
+    of_ = state;
+    return *skin_;
+  }
+
   const BodyModel& model_;
   const BodyResiduals& residuals_;
-  std::stop_token stop_;
+  const SolverWatch& watch_;
+  mutable std::optional<PosedSkin> skin_;
+  mutable BodyState of_;
 };
 
 /// Keeps the joints (not the root) within the limits, and moves the start there.
@@ -118,8 +142,8 @@ void applyLimits(ceres::Problem& problem, const JointLimits& limits, double* rot
 class FittedFrame {
  public:
   FittedFrame(const BodyModel& model, std::span<const SurfaceTarget> targets, const BodyFitOptions& options,
-              const Pose& pose, double prior_share)
-      : residuals_(model, targets, options, prior_share), cost_(model, residuals_, options.stop), pose_(pose) {
+              const Pose& pose, double prior_share, const SolverWatch& watch)
+      : residuals_(model, targets, options, prior_share), cost_(model, residuals_, watch), pose_(pose) {
     placement_ << pose.translation, pose.rotations.row(0).transpose();
   }
   FittedFrame(const FittedFrame&) = delete;
@@ -211,17 +235,17 @@ Solved<BodySequence> fitBodies(const BodyModel& model, const BodySequence& start
   ownership.cost_function_ownership = ceres::DO_NOT_TAKE_OWNERSHIP;
   ceres::Problem problem(ownership);
   Eigen::VectorXd identity = start.identity;
+  SolverWatch watch(options.stop, options.max_iterations);
   std::deque<FittedFrame> frames;  // they stay where Ceres was told
   for (std::size_t f = 0; f < targets.size(); ++f) {
     requireTargets(targets[f], model.topology()->vertexCount());
     model.posed({start.identity, start.poses[f]});  // says what does not fit
-    frames.emplace_back(model, targets[f], options, start.poses[f], 1.0 / double(targets.size()));
+    frames.emplace_back(model, targets[f], options, start.poses[f], 1.0 / double(targets.size()), watch);
     frames.back().addTo(problem, identity, model, options);
   }
   if (!options.identity) problem.SetParameterBlockConstant(identity.data());
-  StopCallback callback(options.stop);
   ceres::Solver::Summary summary;
-  ceres::Solve(solverOptions(options, &callback), &problem, &summary);
+  ceres::Solve(solverOptions(options, &watch), &problem, &summary);
   Outcome outcome = outcomeOf(summary);
   // Once the token has fired the cost tells nothing.
   if (options.stop.stop_requested()) outcome.termination = Termination::kCancelled;

@@ -49,12 +49,12 @@ Vertices unflattened(const Eigen::VectorXd& flat) {
 
 BodyModel::BodyModel(BodyParts parts) : parts_(std::move(parts)) {
   requireParts(parts_);
-  scaled_modes_ = parts_.modes * parts_.deviations.asDiagonal();
+  shape_modes_.vertices = parts_.modes * parts_.deviations.asDiagonal();
   mean_joints_ = parts_.regressor * parts_.mean;
-  joint_modes_.resize(3 * skeleton().jointCount(), modeCount());
+  shape_modes_.joints.resize(3 * skeleton().jointCount(), modeCount());
   for (Eigen::Index m = 0; m < modeCount(); ++m) {
-    const Vertices joints = parts_.regressor * unflattened(scaled_modes_.col(m));
-    joint_modes_.col(m) = Eigen::Map<const Eigen::VectorXd>(joints.data(), joints.size());
+    const Vertices joints = parts_.regressor * unflattened(shape_modes_.vertices.col(m));
+    shape_modes_.joints.col(m) = Eigen::Map<const Eigen::VectorXd>(joints.data(), joints.size());
   }
 }
 
@@ -64,11 +64,11 @@ Vertices BodyModel::rest(const Eigen::VectorXd& identity) const {
   if (identity.size() != modeCount())
     throw InvalidInput("identity",
                        "has " + std::to_string(identity.size()) + " coefficients, want " + std::to_string(modeCount()));
-  return parts_.mean + unflattened(scaled_modes_ * identity);
+  return parts_.mean + unflattened(shape_modes_.vertices * identity);
 }
 
 Vertices BodyModel::restJoints(const Eigen::VectorXd& identity) const {
-  return mean_joints_ + unflattened(joint_modes_ * identity);
+  return mean_joints_ + unflattened(shape_modes_.joints * identity);
 }
 
 PosedSkin BodyModel::posed(const BodyState& state) const {

@@ -4,7 +4,7 @@
 
 #include "core/mesh/topology.h"
 #include "core/skeleton/joint_regressor.h"
-#include "core/skeleton/skinning.h"
+#include "core/skeleton/point_derivatives.h"
 
 namespace shaped {
 
@@ -55,10 +55,8 @@ class BodyModel {
   /// outlive it.
   PosedSkin posed(const BodyState& state) const;
 
-  /// How the rest position of a vertex follows the identity, 3 x k: the rows of A times the deviations.
-  PosedSkin::VertexModes vertexModes(Eigen::Index vertex) const { return scaled_modes_.middleRows<3>(3 * vertex); }
-  /// The same for the rest joints, 3 J x k, joint by joint.
-  const Eigen::MatrixXd& jointModes() const { return joint_modes_; }
+  /// How vertices and joints at rest follow the identity: the rows of A times the deviations.
+  const ShapeModes& shapeModes() const { return shape_modes_; }
 
   /// Coefficients of a shape that stands in the model's rest pose and place, by orthogonal projection.
   Eigen::VectorXd identityOf(const Vertices& rest) const;
@@ -68,8 +66,7 @@ class BodyModel {
 
  private:
   BodyParts parts_;
-  Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor> scaled_modes_;  ///< a vertex in one place
-  Eigen::MatrixXd joint_modes_;
+  ShapeModes shape_modes_;
   Vertices mean_joints_;
 };
 

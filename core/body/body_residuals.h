@@ -19,15 +19,16 @@ class BodyResiduals {
                 double prior_share = 1);
 
   Eigen::Index parameterCount() const { return parameters_; }
-  /// The sum of squares.
-  double energy(const BodyState& state) const;
+  /// The sum of squares. Here and below, skin: the model in that state.
+  double energy(const BodyState& state, const PosedSkin& skin) const;
   /// [J r], one row a residual: derivatives, then the residual itself.
-  Rows rows(const BodyState& state) const;
+  Rows rows(const BodyState& state, const PosedSkin& skin) const;
   /// [J r]^T [J r], symmetric: all that a least squares step needs, without a row ever being kept.
-  Eigen::MatrixXd squares(const BodyState& state) const;
+  Eigen::MatrixXd squares(const BodyState& state, const PosedSkin& skin) const;
 
  private:
   class TargetRows;
+  class RowProducts;
 
   Eigen::Index rowCount(const SurfaceTarget& target) const { return target.normal.isZero(0) ? 3 : 1; }
   /// The priors are one residual a parameter, or none: factor and place.
@@ -36,6 +37,7 @@ class BodyResiduals {
 
   const BodyModel& model_;
   std::span<const SurfaceTarget> targets_;
+  std::vector<std::size_t> by_bone_;  ///< the targets, one bone after the other
   Eigen::Index parameters_;
   double scale_, identity_prior_, joint_prior_;
 };

@@ -215,12 +215,13 @@ double PartFit::cost(const Pairs& pairs, const Pose& pose) const {
 
 double PartFit::cost(const Pose& pose) const { return cost(pairsOf(pointsOf(skinOf(pose))), pose); }
 
-Eigen::RowVectorXd PartFit::rowOf(const PosedSkin& skin, const Pair& pair) const {
-  const auto joints = model_.skeleton().jointCount();
-  Eigen::Matrix3Xd levers = Eigen::Matrix3Xd::Zero(3, joints);
-  skin.addLevers(pair.vertex, 1, levers);
-  Eigen::RowVectorXd all(3 + 3 * joints), mine(Eigen::Index(3 * moving_.size()));
-  skin.poseRow(levers, scan_.col(pair.scan).tail<3>(), all);
+Eigen::RowVectorXd PartFit::rowOf(const Pair& pair, PointDerivatives& derivatives) const {
+  const auto vertex = std::int32_t(pair.vertex);
+  const double share = 1;
+  derivatives.turnTo({&vertex, 1}, {&share, 1});
+  Eigen::RowVectorXd all = Eigen::RowVectorXd::Zero(3 + 3 * model_.skeleton().jointCount()),
+                     mine(Eigen::Index(3 * moving_.size()));
+  derivatives.poseRow(scan_.col(pair.scan).tail<3>(), all);
   for (std::size_t i = 0; i < moving_.size(); ++i)
     mine.segment<3>(Eigen::Index(3 * i)) = all.segment<3>(3 + 3 * moving_[i]);
   return mine;
@@ -231,13 +232,14 @@ void PartFit::step(const PosedSkin& skin, const Points& part, const Pairs& pairs
   Eigen::MatrixXd normal = Eigen::MatrixXd::Zero(size, size);
   Eigen::VectorXd right = Eigen::VectorXd::Zero(size);
   double count = 0;
+  PointDerivatives derivatives(skin);
   for (const auto* side : {&pairs.outward, &pairs.back})
     for (const auto& pair : *side) {
       const double share = scale * scale / (scale * scale + pair.squared), weight = share * share;
       const Eigen::Vector3d direction = scan_.col(pair.scan).tail<3>();
       count += 1;
       if (weight < 1e-3 || direction.isZero(0)) continue;
-      const Eigen::RowVectorXd row = rowOf(skin, pair);
+      const Eigen::RowVectorXd row = rowOf(pair, derivatives);
       const double height = direction.dot(part.col(pair.vertex).head<3>() - scan_.col(pair.scan).head<3>());
       normal.noalias() += weight * row.transpose() * row;
       right.noalias() -= weight * height * row.transpose();

@@ -73,7 +73,7 @@ class PartFit {
   /// From what is likely, in standard deviations, squared.
   double turned(const Pose& pose) const;
   /// How a pair's height follows the joints that move.
-  Eigen::RowVectorXd rowOf(const PosedSkin& skin, const Pair& pair) const;
+  Eigen::RowVectorXd rowOf(const Pair& pair, PointDerivatives& derivatives) const;
   void step(const PosedSkin& skin, const Points& part, const Pairs& pairs, double scale, Pose& pose) const;
   /// Adds the prior to normal equations, and takes the step.
   void turn(Eigen::MatrixXd normal, Eigen::VectorXd right, Pose& pose) const;

@@ -72,7 +72,7 @@ std::shared_ptr<const FieldDeformation> BodyShapes::field(const std::stop_token&
 std::size_t BodyShapes::bytes() const {
   const auto& parts = model_->parts();
   // The model keeps its modes as they are and scaled; the template repeats mean, weights and regressor.
-  const auto numbers = 2 * (parts.modes.size() + parts.mean.size()) + model_->jointModes().size();
+  const auto numbers = 2 * (parts.modes.size() + parts.mean.size()) + model_->shapeModes().joints.size();
   const auto topology =
       9 * static_cast<std::size_t>(parts.topology->faces().rows()) + 2 * parts.topology->edges().size();
   const auto deformation = field();

@@ -33,13 +33,14 @@ TEST_CASE("derivatives of the body residuals meet central differences") {
   const BodyState state{randomIdentity(model, 2), randomPose(model.skeleton(), 0.9, 3)};
   const auto targets = mixedTargets(model, jitter(model.parts().mean, 0.1, 3));
   const BodyResiduals residuals(model, targets, {});
-  const auto rows = residuals.rows(state);
+  const auto rows = residuals.rows(state, model.posed(state));
   const Eigen::Index n = residuals.parameterCount();
   Eigen::VectorXd at(n);
   at << state.identity, toVector(state.pose);
   const auto values = [&](Eigen::Index parameter, double step) -> Eigen::VectorXd {
     const Eigen::VectorXd moved = at + step * Eigen::VectorXd::Unit(n, parameter);
-    return residuals.rows({moved.head(3), poseFrom(moved.tail(n - 3))}).col(n);
+    const BodyState there{moved.head(3), poseFrom(moved.tail(n - 3))};
+    return residuals.rows(there, model.posed(there)).col(n);
   };
   const double step = 1e-4, scale = rows.leftCols(n).cwiseAbs().maxCoeff();
   for (Eigen::Index p = 0; p < n; ++p) {
@@ -55,9 +56,10 @@ TEST_CASE("the squares of the body residuals are those of their rows") {
   const BodyState state{randomIdentity(model, 2), randomPose(model.skeleton(), 0.9, 3)};
   const auto targets = mixedTargets(model, jitter(model.parts().mean, 0.1, 3));
   const BodyResiduals residuals(model, targets, {});
-  const Eigen::MatrixXd rows = residuals.rows(state), expected = rows.transpose() * rows;
-  CHECK((residuals.squares(state) - expected).cwiseAbs().maxCoeff() < 1e-12 * expected.cwiseAbs().maxCoeff());
-  CHECK(residuals.energy(state) == Approx(rows.col(rows.cols() - 1).squaredNorm()).epsilon(1e-13));
+  const Eigen::MatrixXd rows = residuals.rows(state, model.posed(state)), expected = rows.transpose() * rows;
+  CHECK((residuals.squares(state, model.posed(state)) - expected).cwiseAbs().maxCoeff() <
+        1e-12 * expected.cwiseAbs().maxCoeff());
+  CHECK(residuals.energy(state, model.posed(state)) == Approx(rows.col(rows.cols() - 1).squaredNorm()).epsilon(1e-13));
 }
 
 TEST_CASE("fitting a body recovers identity and pose from its own vertices") {

@@ -36,17 +36,6 @@ Vertices literalSkinning(const Rig& rig, const Vertices& rest, const Pose& pose)
   return posed;
 }
 
-/// Column by column central differences of one vertex's place.
-Eigen::Matrix3Xd differences(const std::function<Eigen::Vector3d(const Eigen::VectorXd&)>& place,
-                             const Eigen::VectorXd& at, double step) {
-  Eigen::Matrix3Xd columns(3, at.size());
-  for (Eigen::Index c = 0; c < at.size(); ++c) {
-    const Eigen::VectorXd d = step * Eigen::VectorXd::Unit(at.size(), c);
-    columns.col(c) = (8 * (place(at + d) - place(at - d)) - (place(at + 2 * d) - place(at - 2 * d))) / (12 * step);
-  }
-  return columns;
-}
-
 }  // namespace
 
 TEST_CASE("linear blend skinning agrees with products of homogeneous matrices") {
@@ -70,63 +59,6 @@ TEST_CASE("the root's transform moves a body rigidly") {
   const Vertices expected =
       ((tube.mesh.vertices.rowwise() - root) * turn.transpose()).rowwise() + (root + Eigen::RowVector3d(1, 2, 3));
   CHECK((posed - expected).cwiseAbs().maxCoeff() < 1e-13);
-}
-
-TEST_CASE("derivatives of skinning in the pose meet central differences, at rest and far from it") {
-  const auto tube = riggedTube(5);
-  const auto& rig = tube.rig;
-  for (const double angle : {0.0, 1e-3, 0.6, 2.8}) {
-    const Eigen::VectorXd at = toVector(randomPose(rig.skeleton, angle, 3));
-    const PosedSkin skin(rig.skeleton, rig.weights, tube.mesh.vertices, rig.rest_joints, poseFrom(at));
-    Eigen::Matrix3Xd derivative(3, at.size());
-    for (Eigen::Index v = 0; v < tube.mesh.vertices.rows(); v += 29) {
-      skin.poseDerivative(v, derivative);
-      const auto place = [&](const Eigen::VectorXd& pose) -> Eigen::Vector3d {
-        return skinned(rig, tube.mesh.vertices, poseFrom(pose)).row(v).transpose();
-      };
-      CHECK((derivative - differences(place, at, 1e-3)).cwiseAbs().maxCoeff() < 1e-9);
-    }
-  }
-}
-
-TEST_CASE("derivatives of skinning in the shape meet central differences, joints following the mesh") {
-  const auto tube = riggedTube(4);
-  const auto& rig = tube.rig;
-  const JointRegressor regressor = clusterRegressor(rig, tube.mesh.vertices);
-  const Pose pose = randomPose(rig.skeleton, 1.2, 8);
-  const Eigen::Index modes = 4;
-  const Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor> shape_modes =
-      Eigen::MatrixXd::Random(3 * tube.mesh.vertices.rows(), modes);
-  const auto rest = [&](const Eigen::VectorXd& coefficients) -> Vertices {
-    const Eigen::VectorXd offset = shape_modes * coefficients;
-    return tube.mesh.vertices + Eigen::Map<const Vertices>(offset.data(), tube.mesh.vertices.rows(), 3);
-  };
-  const auto posed = [&](const Eigen::VectorXd& coefficients) {
-    const Vertices body = rest(coefficients);
-    return PosedSkin(rig.skeleton, rig.weights, body, regressor * body, pose);
-  };
-  Eigen::MatrixXd joint_modes(3 * rig.skeleton.jointCount(), modes);
-  for (Eigen::Index m = 0; m < modes; ++m) {
-    const Eigen::VectorXd mode = shape_modes.col(m);
-    const Vertices joints = regressor * Eigen::Map<const Vertices>(mode.data(), tube.mesh.vertices.rows(), 3);
-    joint_modes.col(m) = Eigen::Map<const Eigen::VectorXd>(joints.data(), joints.size());
-  }
-  const Eigen::VectorXd at = 0.1 * Eigen::VectorXd::Ones(modes);
-  const PosedSkin skin = posed(at);
-  const auto bones = skin.boneDerivatives(joint_modes);
-  for (Eigen::Index v = 0; v < tube.mesh.vertices.rows(); v += 31) {
-    const auto place = [&](const Eigen::VectorXd& x) -> Eigen::Vector3d {
-      return posed(x).vertices().row(v).transpose();
-    };
-    Eigen::MatrixXd derivative(3, modes);
-    for (int axis = 0; axis < 3; ++axis) {
-      Eigen::RowVectorXd row = Eigen::RowVectorXd::Ones(modes);
-      skin.addShapeRow(v, 2, Eigen::Vector3d::Unit(axis), shape_modes.middleRows<3>(3 * v), bones, row);
-      derivative.row(axis) = (row.array() - 1) / 2;
-    }
-    CHECK((derivative - differences(place, at, 1e-2)).cwiseAbs().maxCoeff() < 1e-10);
-    CHECK(derivative.norm() > 0.1);
-  }
 }
 
 TEST_CASE("unskinning undoes skinning, and says where it cannot") {
