@@ -35,7 +35,7 @@ void requireInputs(const BootstrapInputs& inputs, const FieldTrainer& train, con
 void requireSameKind(const BootstrapCheckpoint& checkpoint, const BootstrapInputs& inputs,
                      const FieldExamples& field_examples) {
   const auto examples = checkpoint.examples.size();
-  bool fits = examples == 0 || examples == field_examples.count(checkpoint.rounds.size());
+  bool fits = examples == 0 || examples == field_examples.count();
   for (const auto& scan : checkpoint.scans) fits = fits && scan.report.scan < inputs.scans.count;
   for (const auto& shape : checkpoint.joined) fits = fits && shape.rows() == inputs.reference.rest.rows();
   if (!fits) throw InvalidInput("checkpoint", "is of other inputs; begin anew");
@@ -52,15 +52,10 @@ class Bootstrap {
  public:
   Bootstrap(const BootstrapInputs& inputs, const FieldTrainer& train, const BootstrapOptions& options,
             const BootstrapWatch& watch, BootstrapCheckpoint state)
-      : inputs_(inputs),
-        train_(train),
-        options_(options),
-        watch_(watch),
-        examples_(inputs, options),
-        state_(std::move(state)) {
-    requireSameKind(state_, inputs, examples_);
-    registrations_ = modelRegistrations(inputs_, options_, state_.rounds.size(), state_.joined);
-    state_.examples.resize(exampleCount());
+      : inputs_(inputs), train_(train), options_(options), watch_(watch), state_(std::move(state)) {
+    teach();
+    requireSameKind(state_, inputs, *examples_);
+    state_.examples.resize(examples_->count());
   }
 
   std::optional<Bootstrapped> run() {
@@ -147,15 +142,15 @@ class Bootstrap {
   }
 
   bool fitExamples(const BodyModel& model) {
-    forAll(exampleCount(), [&](std::size_t i) {
+    forAll(examples_->count(), [&](std::size_t i) {
       if (state_.examples[i]) return;
-      auto fitted = examples_.fit(i, model, watch_.stop);
+      auto fitted = examples_->fit(i, model, watch_.stop);
       if (!fitted) return;
       note([&] {
         state_.examples[i] = std::move(fitted);
         const auto done = std::count_if(state_.examples.begin(), state_.examples.end(),
                                         [](const auto& example) { return example.has_value(); });
-        tellOf("fitting the field's scans, ", done, exampleCount(), 0, kFieldBegins);
+        tellOf("fitting the field's scans, ", done, examples_->count(), 0, kFieldBegins);
       });
     });
     return !stopped();
@@ -163,9 +158,9 @@ class Bootstrap {
 
   /// Of the scans that were fitted and show enough, in their order.
   std::vector<TaughtResidual> residualsOf(const BodyModel& model) const {
-    std::vector<std::optional<ResidualExample>> found(exampleCount());
+    std::vector<std::optional<ResidualExample>> found(examples_->count());
     forAll(found.size(), [&](std::size_t i) {
-      if (taught(i)) found[i] = examples_.residual(i, model, *state_.examples[i]);
+      if (taught(i)) found[i] = examples_->residual(i, model, *state_.examples[i]);
     });
     std::vector<TaughtResidual> residuals;
     for (std::size_t i = 0; i < found.size(); ++i)
@@ -184,7 +179,7 @@ class Bootstrap {
     std::vector<std::optional<RestPair>> pairs(residuals.size());
     forAll(pairs.size(), [&](std::size_t k) {
       const auto& [i, residual] = residuals[k];
-      pairs[k] = examples_.pair(i, model, *state_.examples[i], residual, predicted[k]);
+      pairs[k] = examples_->pair(i, model, *state_.examples[i], residual, predicted[k]);
     });
     std::vector<RestPair> usable;
     for (auto& pair : pairs)
@@ -264,8 +259,8 @@ class Bootstrap {
     round.round = roundNumber();
     round.registrations = registrations_.size();
     std::set<std::size_t> examples;
-    for (std::size_t i = 0; i < exampleCount(); ++i)
-      if (taught(i)) examples.insert(examples_.example(i));
+    for (std::size_t i = 0; i < examples_->count(); ++i)
+      if (taught(i)) examples.insert(examples_->example(i));
     round.examples = examples.size();
     for (const auto& fitted : state_.scans) round.scans.push_back(fitted.report);
     judge(options_.acceptance, round);
@@ -283,16 +278,20 @@ class Bootstrap {
     state_.joined.insert(state_.joined.end(), surfaces.begin(), surfaces.end());
     state_.scans.clear();
     state_.rounds.push_back(std::move(round));
-    auto registrations = modelRegistrations(inputs_, options_, state_.rounds.size(), state_.joined);
-    if (registrations.size() > registrations_.size()) {  // else model and field are what they would become
-      registrations_ = std::move(registrations);
+    const auto before = registrations_.size();
+    teach();
+    if (registrations_.size() > before) {  // else model and field are what they would become
       state_.field.reset();
-      state_.examples.assign(exampleCount(), std::nullopt);
+      state_.examples.assign(examples_->count(), std::nullopt);
     }
     if (watch_.each_round) watch_.each_round(state_.rounds.back());
   }
 
-  std::size_t exampleCount() const { return examples_.count(state_.rounds.size()); }
+  /// What the coming round learns from.
+  void teach() {
+    examples_.emplace(inputs_, options_, state_.rounds.size(), state_.joined);
+    registrations_ = modelRegistrations(inputs_, options_, state_.rounds.size(), state_.joined);
+  }
 
   int roundNumber() const { return static_cast<int>(state_.rounds.size()) + 1; }
 
@@ -338,8 +337,8 @@ class Bootstrap {
   const FieldTrainer& train_;
   const BootstrapOptions& options_;
   const BootstrapWatch& watch_;
-  FieldExamples examples_;
   BootstrapCheckpoint state_;
+  std::optional<FieldExamples> examples_;            ///< of the round; refers to what joined
   std::vector<Vertices> registrations_;              ///< R_PCA
   std::shared_ptr<const FieldReference> reference_;  ///< of the present model, once it is wanted
   std::mutex mutex_;                                 ///< of the state while scans are worked on, and of who watches

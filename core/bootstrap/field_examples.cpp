@@ -9,38 +9,38 @@
 #include "core/skeleton/skinning.h"
 
 namespace shaped {
-FieldExamples::FieldExamples(const BootstrapInputs& inputs, const BootstrapOptions& options)
+namespace {
+
+const std::optional<Scan> kNoScan;
+
+std::string indexed(const char* list, std::size_t i) { return std::string(list) + "[" + std::to_string(i) + "]"; }
+
+}  // namespace
+
+FieldExamples::FieldExamples(const BootstrapInputs& inputs, const BootstrapOptions& options, std::size_t rounds,
+                             const std::vector<Vertices>& joined)
     : inputs_(inputs), options_(options) {
   if (inputs.examples.empty()) throw InvalidInput("examples", "are none; the field is trained on one at least");
-  const auto virtual_scans = static_cast<std::size_t>(options.virtual_scans);
   for (std::size_t i = 0; i < inputs.examples.size(); ++i) {
     const auto& [registration, scan] = inputs.examples[i];
-    requireValidShape(*inputs.reference.topology, registration, nameOf(i));
-    if (scan) requireUsableScan(*scan, "examples[" + std::to_string(i) + "].scan");
-    for (std::size_t number = 0; number < (scan ? 1 : virtual_scans); ++number) scans_.push_back({i, number});
+    const std::string name = indexed("examples", i);
+    requireValidShape(*inputs.reference.topology, registration, name + ".registration");
+    if (scan) requireUsableScan(*scan, name + ".scan");
+    add(name + ".registration", registration, scan);
   }
-  own_ = scans_.size();
-  if (!options.share_registrations) return;
+  if (!options.share_registrations || rounds == 0) return;
   for (std::size_t i = 0; i < inputs.registrations.size(); ++i)
-    for (std::size_t number = 0; number < virtual_scans; ++number)
-      scans_.push_back({inputs.examples.size() + i, number});
+    add(indexed("registrations", i), inputs.registrations[i], kNoScan);
+  for (std::size_t i = 0; i < joined.size(); ++i) add(indexed("joined", i), joined[i], kNoScan);
 }
 
-std::size_t FieldExamples::count(std::size_t rounds) const { return rounds == 0 ? own_ : scans_.size(); }
-
-const Vertices& FieldExamples::registration(std::size_t example) const {
-  const auto own = inputs_.examples.size();
-  return example < own ? inputs_.examples[example].registration : inputs_.registrations[example - own];
-}
-
-std::string FieldExamples::nameOf(std::size_t example) const {
-  const auto own = inputs_.examples.size();
-  return example < own ? "examples[" + std::to_string(example) + "].registration"
-                       : "registrations[" + std::to_string(example - own) + "]";
+void FieldExamples::add(std::string name, const Vertices& registration, const std::optional<Scan>& scan) {
+  scans_.insert(scans_.end(), scan ? 1 : static_cast<std::size_t>(options_.virtual_scans), examples_.size());
+  examples_.push_back({std::move(name), registration, scan});
 }
 
 Vertices FieldExamples::atRest(std::size_t example) const {
-  return normalisedPosture(inputs_.reference, registration(example), options_.posture, options_.reach);
+  return normalisedPosture(inputs_.reference, examples_[example].registration, options_.posture, options_.reach);
 }
 
 /// The registration in a posture near rest.
@@ -55,9 +55,8 @@ Vertices FieldExamples::posed(std::size_t example, std::uint64_t seed) const {
 }
 
 Scan FieldExamples::scanned(std::size_t i) const {
-  const auto [example, number] = scans_[i];
-  if (i < own_ && inputs_.examples[example].scan)
-    return preparedScan(*inputs_.examples[example].scan, options_.registration.unit_factor);
+  const auto example = scans_[i];
+  if (const auto& scan = examples_[example].scan) return preparedScan(*scan, options_.registration.unit_factor);
   Random random(options_.seed + i);
   auto scanner = options_.scanner;
   scanner.seed = random.bits();
@@ -65,7 +64,7 @@ Scan FieldExamples::scanned(std::size_t i) const {
     return preparedScan(scanVirtually(posed(example, random.bits()), inputs_.reference.topology->faces(), scanner).scan,
                         1);
   } catch (const InvalidInput& problem) {
-    throw InvalidInput(nameOf(example), std::string("cannot be scanned: ") + problem.what());
+    throw InvalidInput(examples_[example].name, std::string("cannot be scanned: ") + problem.what());
   }
 }
 
@@ -84,7 +83,7 @@ std::optional<BodyState> FieldExamples::fit(std::size_t i, const BodyModel& mode
 
 std::optional<ResidualExample> FieldExamples::residual(std::size_t i, const BodyModel& model,
                                                        const BodyState& state) const {
-  const auto example = scans_[i].example;
+  const auto example = scans_[i];
   const Scan seen = scanAtRest(model, state, ScanSurface(scanned(i)));
   if (seen.points.rows() < kFewestScanPoints) return std::nullopt;
   const Vertices fitted = model.rest(state.identity);

@@ -7,18 +7,20 @@
 
 namespace shaped {
 
-/// The registrations that teach the field, with their scans: one each where it is given, else
-/// BootstrapOptions::virtual_scans of them. First those of R_DEFORM, then those that the model began with, which teach
-/// once registrations are shared.
+/// The registrations that teach a round's field, with their scans: one each where it is given, else
+/// BootstrapOptions::virtual_scans of them. First those of R_DEFORM; once registrations are shared, those that the
+/// model began with and those that joined, too.
 class FieldExamples {
  public:
-  /// All must outlive it. Throws InvalidInput naming `examples`, or the registration or scan that is no good.
-  FieldExamples(const BootstrapInputs& inputs, const BootstrapOptions& options);
+  /// After that many rounds, in which these joined. All must outlive it. Throws InvalidInput naming `examples`, or the
+  /// registration or scan that is no good.
+  FieldExamples(const BootstrapInputs& inputs, const BootstrapOptions& options, std::size_t rounds,
+                const std::vector<Vertices>& joined);
 
-  /// Scans of all registrations that teach after that many rounds.
-  std::size_t count(std::size_t rounds) const;
+  /// Scans of all registrations.
+  std::size_t count() const { return scans_.size(); }
   /// The registration that scan i is of.
-  std::size_t example(std::size_t i) const { return scans_[i].example; }
+  std::size_t example(std::size_t i) const { return scans_[i]; }
 
   /// Fits a model to scan i. Nothing once the stop token has fired; a state without numbers where the fit failed or
   /// scores below what is trusted.
@@ -32,21 +34,21 @@ class FieldExamples {
                                const ResidualExample& residual, const Vertices& predicted) const;
 
  private:
-  const Vertices& registration(std::size_t example) const;
-  std::string nameOf(std::size_t example) const;
+  struct Example {
+    std::string name;
+    const Vertices& registration;
+    const std::optional<Scan>& scan;
+  };
+
+  void add(std::string name, const Vertices& registration, const std::optional<Scan>& scan);
   Scan scanned(std::size_t i) const;
   Vertices atRest(std::size_t example) const;
   Vertices posed(std::size_t example, std::uint64_t seed) const;
 
-  /// Which registration a scan is of, and the number of its virtual scan.
-  struct Source {
-    std::size_t example, number;
-  };
-
   const BootstrapInputs& inputs_;
   const BootstrapOptions& options_;
-  std::vector<Source> scans_;
-  std::size_t own_ = 0;  ///< scans of R_DEFORM
+  std::vector<Example> examples_;
+  std::vector<std::size_t> scans_;  ///< the example of each
 };
 
 }  // namespace shaped

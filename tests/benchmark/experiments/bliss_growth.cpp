@@ -78,9 +78,10 @@ std::vector<Snapshot> snapshotsOf(const BootstrapInputs& inputs, const Bootstrap
   return snapshots;
 }
 
-/// Mean distances over all trials, mm.
+/// Mean distances over all trials, mm, and how those of registrations where they stand are spread.
 struct Measured {
-  double model_posed = 0, model_rest = 0, posed = 0, rest = 0, worst = 0, seconds = 0;
+  double model_posed = 0, model_rest = 0, posed = 0, rest = 0, seconds = 0;
+  double median = 0, worst = 0;
 };
 
 double distanceAtRest(const Vertices& shape, const Vertices& truth) {
@@ -113,8 +114,10 @@ Measured measured(const BodyModel& model, const ScanRegistrationOptions& registr
     sum.model_rest += one.model_rest / count;
     sum.posed += one.posed / count;
     sum.rest += one.rest / count;
-    sum.worst = std::max(sum.worst, one.posed);
   }
+  std::ranges::sort(each, {}, &Measured::posed);
+  sum.median = each[each.size() / 2].posed;
+  sum.worst = each.back().posed;
   sum.seconds = watch.cpu() / count;
   return sum;
 }
@@ -145,8 +148,9 @@ void tellBaselines(Report& report, const BootstrapInputs& inputs, const Bootstra
 }
 
 void tell(Report& report, const std::string& what, const Measured& of) {
-  report.entry(what + ", v2v posed: model's fit; with the field, mean (worst)",
-               text("%.2f; %.2f (%.2f) mm, %.2f times", of.model_posed, of.posed, of.worst, of.posed / of.model_posed));
+  report.entry(what + ", v2v posed: model's fit; with the field, mean, median (worst)",
+               text("%.2f; %.2f, %.2f (%.2f) mm, %.2f times", of.model_posed, of.posed, of.median, of.worst,
+                    of.posed / of.model_posed));
   report.entry(what + ", v2v at rest: model's fit; with the field; CPU s a scan",
                text("%.2f; %.2f mm, %.2f times; %.2f s", of.model_rest, of.rest, of.rest / of.model_rest, of.seconds));
 }
@@ -159,7 +163,7 @@ int setting(const char* name, int otherwise) {
 }
 
 void grow(Report& report, BootstrapInputs inputs, const BootstrapOptions& options, const std::vector<Trial>& trials) {
-  tellBaselines(report, inputs, options, trials);
+  if (setting("SHAPED_BASELINES", 1) != 0) tellBaselines(report, inputs, options, trials);
   const int epochs = setting("SHAPED_EPOCHS", 20);
   std::vector<BootstrapRound> rounds;
   const auto snapshots = snapshotsOf(inputs, options, epochs, false, rounds);
@@ -195,6 +199,7 @@ BootstrapOptions growthOptions() {
   options.posture = PostureNormalisation::kNone;
   options.rounds = setting("SHAPED_ROUNDS", 3);
   options.acceptance = setting("SHAPED_ACCEPTANCE", 1);
+  options.sample = setting("SHAPED_SAMPLE", 0);
   options.share_registrations = setting("SHAPED_SHARED", 1) != 0;
   return options;
 }
