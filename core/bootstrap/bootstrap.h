@@ -68,8 +68,8 @@ std::vector<Vertices> modelRegistrations(const BootstrapInputs& inputs, const Bo
 /// to R_PCA whose chamfer distance (both ways, posed surface and scan) is at most the smallest plus `acceptance`
 /// standard deviations. Ours: a fit that failed or scores below registration.least_score is not compared and never
 /// joins. It ends when fewer than least_joined join, no scan is left, or the rounds are done; model and field are then
-/// learned once more from what there is. Before the first round R_PCA and R_DEFORM are apart, later all of both teaches
-/// both (share_registrations).
+/// learned once more from what there is. Before the first round R_PCA and R_DEFORM are apart, later both and what
+/// joined teach both, the latter by virtual scans of X' (share_registrations).
 ///
 /// Ours, too: what the model's fits leave of R_DEFORM is learned by a ridge regression first (fitResiduals), and the
 /// field what that leaves, from predictions for each body by a regression without it. Between them goes a smooth
