@@ -144,7 +144,7 @@ std::optional<DeformedBody> FieldDeformation::deform(const BodyModel& model, con
     if (!jacobians.allFinite()) return std::nullopt;
     rest = reference_->poisson->solve(jacobians, features.centroids);
   }
-  const auto body = refitPose(model, rest, pose, scan, fit, PoseRefit::kFull);
+  const auto body = refitPose(model, rest, pose, scan, fit, regression_ ? PoseRefit::kFine : PoseRefit::kFull);
   return DeformedBody{std::move(rest), body.state.pose, body.posed()};
 }
 

@@ -13,7 +13,8 @@ PosedBody refitPose(const BodyModel& model, const Vertices& rest, const Pose& ne
   BodyModel body(std::move(parts));
   ModelFitOptions fit = options;
   fit.identity = false;
-  while (fit.levels.size() > 2) fit.levels.erase(fit.levels.begin());
+  const std::size_t kept = how == PoseRefit::kFine ? 1 : 2;
+  while (fit.levels.size() > kept) fit.levels.erase(fit.levels.begin());
   if (how == PoseRefit::kRough && fit.levels.size() > 1) fit.levels.pop_back();
   auto state = fitStateToScan(scan, body, {Eigen::VectorXd::Zero(1), near}, {}, fit).solution;
   return {std::move(body), std::move(state)};

@@ -15,6 +15,7 @@ struct PosedBody {
 /// How far a pose is fitted anew.
 enum class PoseRefit {
   kRough,  ///< by the last level but one of the options: near enough to see what is where
+  kFine,   ///< by the last level: what a rough fit began
   kFull    ///< by the last two levels
 };
 
