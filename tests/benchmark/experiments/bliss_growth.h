@@ -25,8 +25,7 @@ BootstrapInputs growthInputs(const PostureTemplate& reference, const std::vector
 BootstrapOptions growthOptions();
 
 /// Tells what template fitting makes of the first model's fits, what the model and its field make of the trials before
-/// each round and at the end, then what a model and a
-/// field of all registrations at once do.
+/// each round and at the end, then what a model and a field of all registrations at once do.
 void grow(Report& report, BootstrapInputs inputs, const BootstrapOptions& options, const std::vector<Trial>& trials);
 
 }  // namespace shaped::experiments

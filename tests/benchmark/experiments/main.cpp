@@ -1,11 +1,11 @@
 // The measured table on the real data: shaped_experiments ROW..., for example "shaped_experiments 0 2 3". Each row
 // prints a section of RESULTS.md. Environment: SHAPED_DATA, the folder of the real data; SHAPED_ORACLES, the folder of
 // shell_energy.json (default: SHAPED_DATA/oracles); SHAPED_SCANS, how many scans the rows of registration take
-// (default: all 40), SHAPED_EACH, which tells each of them; SHAPED_ROUNDS, SHAPED_UNREGISTERED, SHAPED_ACCEPTANCE,
-// SHAPED_SHARED and SHAPED_EPOCHS of rows bliss and faces; SHAPED_CLOTHED, the only sequence of row clothing (walk or
-// run; default: both), and CLOTHING_MESHES, the folder its bodies are written to; SHAPED_EXPERIMENTS_CACHE, where
-// trained models are kept (default: ~/.cache/shaped-experiments). Exit code 77 when the data is not there, 2 for a row
-// that does not exist.
+// (default: all 40), SHAPED_EACH, which tells each of them; SHAPED_ROUNDS, SHAPED_UNREGISTERED, SHAPED_SAMPLE,
+// SHAPED_ACCEPTANCE, SHAPED_SHARED, SHAPED_EPOCHS and SHAPED_BASELINES (0: no template fitting) of rows bliss and
+// faces; SHAPED_CLOTHED, the only sequence of row clothing (walk or run; default: both), and CLOTHING_MESHES, the
+// folder its bodies are written to; SHAPED_EXPERIMENTS_CACHE, where trained models are kept (default:
+// ~/.cache/shaped-experiments). Exit code 77 when the data is not there, 2 for a row that does not exist.
 
 #include <cstdio>
 #include <functional>
