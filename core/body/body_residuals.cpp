@@ -4,6 +4,8 @@
 #include <cmath>
 #include <numeric>
 
+#include "core/skeleton/foremost_joint.h"
+
 namespace shaped {
 
 /// Writes the rows of targets for one state of the model.
@@ -91,19 +93,6 @@ class BodyResiduals::RowProducts {
   std::vector<bool> moved_;
 };
 
-namespace {
-
-/// The bone that carries a vertex foremost.
-Eigen::Index foremostBone(const SkinWeights& weights, std::int32_t vertex) {
-  Eigen::Index foremost = 0;
-  double most = -1;
-  for (SkinWeights::InnerIterator entry(weights, vertex); entry; ++entry)
-    if (entry.value() > most) most = entry.value(), foremost = entry.col();
-  return foremost;
-}
-
-}  // namespace
-
 BodyResiduals::BodyResiduals(const BodyModel& model, std::span<const SurfaceTarget> targets,
                              const BodyFitOptions& options, double prior_share)
     : model_(model), targets_(targets), parameters_(model.modeCount() + 3 + 3 * model.skeleton().jointCount()) {
@@ -112,8 +101,8 @@ BodyResiduals::BodyResiduals(const BodyModel& model, std::span<const SurfaceTarg
   scale_ = weights > 0 ? std::sqrt(options.observations / weights) / options.sigma : 0;
   identity_prior_ = std::sqrt(options.prior * prior_share);
   joint_prior_ = std::sqrt(options.prior) / options.pose_deviation;
-  std::vector<Eigen::Index> bones;
-  for (const auto& target : targets) bones.push_back(foremostBone(model.parts().weights, target.corners[0]));
+  std::vector<std::int32_t> bones;
+  for (const auto& target : targets) bones.push_back(foremostJoint(model.parts().weights, target.corners[0]));
   by_bone_.resize(targets.size());
   std::iota(by_bone_.begin(), by_bone_.end(), std::size_t{0});
   std::ranges::stable_sort(by_bone_, {}, [&](std::size_t i) { return bones[i]; });

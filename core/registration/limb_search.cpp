@@ -11,6 +11,7 @@
 #include "core/registration/bone_turns.h"
 #include "core/registration/deformation.h"
 #include "core/registration/surface_samples.h"
+#include "core/skeleton/foremost_joint.h"
 #include "core/skeleton/rotation.h"
 #include "core/surface/point_tree.h"
 
@@ -62,11 +63,7 @@ class Limbs {
   bool below(std::int32_t joint, std::int32_t ancestor) const { return hangsBelow(model_.skeleton(), joint, ancestor); }
 
   std::int32_t foremostJoint(Eigen::Index vertex) const {
-    std::int32_t joint = 0;
-    double most = -1;
-    for (SkinWeights::InnerIterator entry(model_.parts().weights, vertex); entry; ++entry)
-      if (entry.value() > most) most = entry.value(), joint = std::int32_t(entry.col());
-    return joint;
+    return shaped::foremostJoint(model_.parts().weights, vertex);
   }
 
  private:

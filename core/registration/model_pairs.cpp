@@ -8,20 +8,10 @@
 
 #include "core/mesh/quality.h"
 #include "core/registration/surface_samples.h"
+#include "core/skeleton/foremost_joint.h"
 
 namespace shaped {
 namespace {
-
-std::int32_t foremostJoint(const SkinWeights& weights, Eigen::Index vertex) {
-  std::int32_t joint = 0;
-  double most = -1;
-  for (SkinWeights::InnerIterator entry(weights, vertex); entry; ++entry)
-    if (entry.value() > most) {
-      most = entry.value();
-      joint = std::int32_t(entry.col());
-    }
-  return joint;
-}
 
 /// A fixed random order of 0 .. n - 1, the same with every standard library.
 std::vector<std::int32_t> shuffled(std::int32_t n) {
