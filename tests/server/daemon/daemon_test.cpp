@@ -235,6 +235,15 @@ TEST_CASE("faulty uploads are refused by frame and leave nothing") {
 
 TEST_CASE("an upload that is broken off leaves nothing") {
   const test::TestDaemon daemon;
+  const auto folder = daemon.folder / "store/datasets";
+  const auto becomesEmpty = [&](bool empty) {
+    const auto until = Clock::now() + 10s;
+    while (std::filesystem::is_empty(folder) != empty) {
+      if (Clock::now() > until) return false;
+      std::this_thread::sleep_for(5ms);
+    }
+    return true;
+  };
   {
     const auto stub = v1::Datasets::NewStub(daemon.channel());
     grpc::ClientContext context;
@@ -242,12 +251,11 @@ TEST_CASE("an upload that is broken off leaves nothing") {
     const auto writer = stub->Upload(&context, &response);
     writer->Write(header("d", 1));
     writer->Write(frame(sphere.vertices));
+    REQUIRE(becomesEmpty(false));  // else the daemon might begin it after it was found empty
     context.TryCancel();
     CHECK(writer->Finish().error_code() == grpc::CANCELLED);
   }
-  const auto folder = daemon.folder / "store/datasets";
-  const auto until = Clock::now() + 10s;
-  while (!std::filesystem::is_empty(folder) && Clock::now() < until) std::this_thread::sleep_for(5ms);
+  CHECK(becomesEmpty(true));
   CHECK(std::filesystem::is_empty(folder));
 }
 
