@@ -1,5 +1,6 @@
 #include "client/shapectl/train_method.h"
 
+#include <iostream>
 #include <map>
 
 #include "client/shapectl/numbers.h"
@@ -9,6 +10,9 @@
 
 namespace shaped::shapectl {
 namespace {
+
+/// Sums of weights further than this from 1 are no rounding of whoever wrote them.
+constexpr double kRoundedWeights = 0.01;
 
 class ShellPgaMethod final : public TrainMethod {
  public:
@@ -97,7 +101,10 @@ v1::PostureNormalisation postureNamed(const std::string& text) {
 }
 
 std::string rigText(const std::string& file, Eigen::Index vertex_count) {
-  readRig(file, static_cast<std::int32_t>(vertex_count));  // says here what is wrong with the file
+  const auto change = readRig(file, static_cast<std::int32_t>(vertex_count)).largest_weight_change;
+  if (change > kRoundedWeights)
+    std::cerr << "warning: " << file << ": weights of a vertex sum to 1 give or take " << change
+              << "; those of every vertex are made to sum to 1\n";
   return readFile(file);
 }
 

@@ -2,6 +2,7 @@
 
 #include <Eigen/Geometry>
 #include <cmath>
+#include <sstream>
 
 #include "core/mesh/quality.h"
 #include "core/numerics/error.h"
@@ -12,6 +13,14 @@ namespace shaped {
 namespace {
 
 using Result = Solved<ScanRegistration>;
+
+/// Four digits of it: nobody reads more in a sentence.
+std::string rounded(double value) {
+  std::ostringstream text;
+  text.precision(4);
+  text << value;
+  return text.str();
+}
 
 std::string percent(double share) { return std::to_string(int(std::lround(100 * share))) + " %"; }
 
@@ -57,13 +66,13 @@ void addWarnings(const ScanRegistrationOptions& options, const Outcome& outcome,
                        " of the scan lies on the registered surface: it shows something else than the model, or the "
                        "registration failed");
   if (result.suspected_unit_factor)
-    warnings.push_back("the scan is about " + std::to_string(1 / *result.suspected_unit_factor) +
+    warnings.push_back("the scan is about " + rounded(1 / *result.suspected_unit_factor) +
                        " times the model's size: its unit may be another; nothing was scaled");
   if (outcome.termination == Termination::kStalled) warnings.push_back("no point of the scan came near the model");
   if (result.flipped_normals) warnings.push_back("the scan's normals pointed inwards and were turned over");
   const double unusual = result.state.identity.squaredNorm() / double(result.state.identity.size());
   if (unusual > 4)
-    warnings.push_back("the identity is unusual: " + std::to_string(std::sqrt(unusual)) +
+    warnings.push_back("the identity is unusual: " + rounded(std::sqrt(unusual)) +
                        " standard deviations a mode in the mean");
   if (result.report.seen < 0.5)
     warnings.push_back("the scan shows " + percent(result.report.seen) +

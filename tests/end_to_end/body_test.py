@@ -148,6 +148,16 @@ class Body(Bodies):
         self.refused("wrong_rig.json", *train, "--rig", wrong)
         self.assertEqual(self.shapectl("describe", "bad").code, NOT_FOUND)
 
+    def test_weights_that_do_not_sum_are_told(self):
+        rig = json.loads((self.sample / "rig.json").read_text())
+        rig["weights"][3] = [[joint, weight / 2] for joint, weight in rig["weights"][3]]
+        halved = self.folder / "halved_rig.json"
+        halved.write_text(json.dumps(rig))
+        train = ("train", "body", "halved", "--template", self.sample / "template.ply", "--frames", self.sample / "bodies.npy")
+        told = self.expect(SUCCESS, *train, "--rig", halved).err
+        self.assertRegex(told, r"warning: .*halved_rig.json: weights of a vertex sum to 1 give or take 0.5")
+        self.assertNotIn("warning", self.expect(SUCCESS, *train, "--rig", self.sample / "rig.json").err)
+
     def test_a_model_without_a_rig_moves_as_a_whole(self):
         self.expect(SUCCESS, "train", "body", "faces", *self.tubes, "--explained", 0.9, "--posture", "local", "--reach", 0.5)
         body = self.expect(SUCCESS, "describe", "faces").json["body"]

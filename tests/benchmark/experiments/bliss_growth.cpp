@@ -107,6 +107,10 @@ Measured measured(const BodyModel& model, const ScanRegistrationOptions& registr
                distanceAtRest(model.rest(found.state.identity), rest), 1000 * meanVertexDistance(found.vertices, posed),
                found.field ? distanceAtRest(found.field->rest, rest) : 0};
   });
+  if (std::getenv("SHAPED_EACH"))
+    for (std::size_t i = 0; i < each.size(); ++i)
+      std::printf("  trial %zu: posed %.2f (model %.2f), rest %.2f (model %.2f) mm\n", i, each[i].posed,
+                  each[i].model_posed, each[i].rest, each[i].model_rest);
   Measured sum;
   const double count = double(trials.size());
   for (const auto& one : each) {

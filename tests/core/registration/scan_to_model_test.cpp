@@ -172,7 +172,7 @@ TEST_CASE("registering reports what is wrong with a scan") {
   CHECK(large.score < 0.1);
   REQUIRE(large.warnings.size() >= 2);
   CHECK_THAT(large.warnings[0], Catch::Contains("of the scan lies on the registered surface"));
-  CHECK_THAT(large.warnings[1], Catch::Contains("times the model's size"));
+  CHECK_THAT(large.warnings[1], Catch::Contains("about 1000 times the model's size"));
   options = {};
   options.unit_factor = 0.001;
   CHECK(registerScan(millimetres, tube.model, {}, options).solution.score > 0.95);
