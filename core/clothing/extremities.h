@@ -2,7 +2,7 @@
 
 #include <span>
 
-#include "core/clothing/part_fit.h"
+#include "core/registration/part_fit.h"
 #include "core/registration/limb_search.h"
 
 namespace shaped {

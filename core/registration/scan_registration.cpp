@@ -8,6 +8,7 @@
 #include "core/numerics/error.h"
 #include "core/registration/model_pairs.h"
 #include "core/registration/scan_checks.h"
+#include "core/registration/tip_seating.h"
 
 namespace shaped {
 namespace {
@@ -85,6 +86,19 @@ void addWarnings(const ScanRegistrationOptions& options, const Outcome& outcome,
     warnings.push_back("the model's field brought the surface no nearer to the scan");
 }
 
+bool usable(const Outcome& fit) { return fit.converged() || fit.termination == Termination::kIterationLimit; }
+
+/// Seats fingers and toes; where one moved, the finest level is gone through once more.
+void seatTipsOf(const ScanSurface& surface, const BodyModel& model, const std::vector<Landmark>& landmarks,
+                const ScanRegistrationOptions& options, Solved<BodyState>& fit) {
+  auto& [identity, pose] = fit.solution;
+  if (seatTips(surface, model, identity, pose, options.tips, options.stop) == 0) return;
+  const auto finest = withLevels(options, options.fit.levels.size() - 1, 1);
+  const int before = fit.iterations;
+  fit = fitStateToScan(surface, model, fit.solution, landmarks, finest);
+  fit.iterations += before;
+}
+
 void deformByField(const ScanSurface& surface, const BodyModel& model, const ScanRegistrationOptions& options,
                    ScanRegistration& result) {
   auto fit = options.fit;
@@ -110,14 +124,16 @@ Result registered(const ScanSurface& surface, const BodyModel& model, const Body
                   ScanRegistration begun) {
   ModelFitOptions fit_options = options.fit;
   fit_options.stop = options.stop;
-  const auto fit = fitModelToScan(surface, model, start, landmarks, fit_options);
+  auto fit = fitStateToScan(surface, model, start, landmarks, fit_options);
+  if (usable(fit)) seatTipsOf(surface, model, landmarks, options, fit);
   Result result(std::move(begun), fit);
-  result.solution.state = fit.solution.state;
-  result.solution.report = fit.solution.report;
-  result.solution.vertices = model.posed(fit.solution.state).vertices();
-  const bool usable = fit.converged() || fit.termination == Termination::kIterationLimit;
-  if (options.field && usable) deformByField(surface, model, options, result.solution);
-  if (options.refine && usable) refine(surface, model, landmarks, options, result);
+  result.solution.state = fit.solution;
+  result.solution.vertices = model.posed(fit.solution).vertices();
+  if (fit.termination != Termination::kCancelled)  // the report would take long
+    result.solution.report =
+        ModelPairs(surface, model, options.fit).report(result.solution.vertices, options.fit.levels.back());
+  if (options.field && usable(fit)) deformByField(surface, model, options, result.solution);
+  if (options.refine && usable(fit)) refine(surface, model, landmarks, options, result);
   result.solution.score = registrationScore(surface, model, result.solution.vertices);
   addWarnings(options, result, result.solution);
   return result;
@@ -138,6 +154,7 @@ FittingOptions refinementDefaults() {
 std::optional<std::string> ScanRegistrationOptions::firstViolation() const {
   if (const auto problem = start.firstViolation()) return "start." + *problem;
   if (const auto problem = fit.firstViolation()) return "fit." + *problem;
+  if (const auto problem = tips.firstViolation()) return "tips." + *problem;
   if (const auto problem = refinement.firstViolation()) return "refinement." + *problem;
   if (!(unit_factor > 0) || !std::isfinite(unit_factor))
     return "unit_factor = " + std::to_string(unit_factor) + ", want > 0";

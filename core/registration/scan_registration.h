@@ -8,6 +8,7 @@
 #include "core/registration/rigid_start.h"
 #include "core/registration/scan_to_model.h"
 #include "core/registration/template_fitting.h"
+#include "core/registration/tip_seating.h"
 
 namespace shaped {
 
@@ -17,6 +18,7 @@ FittingOptions refinementDefaults();
 struct ScanRegistrationOptions {
   RigidStartOptions start;
   ModelFitOptions fit;
+  TipOptions tips;      ///< seated after the fit
   bool refine = false;  ///< whether the fitted surface is then deformed onto the scan (fitTemplate)
   FittingOptions refinement = refinementDefaults();
   std::shared_ptr<const FieldDeformation> field = {};  ///< of the model: then deforms the fitted surface; none: nothing
@@ -51,9 +53,9 @@ struct ScanRegistration {
 };
 
 /// Registers a raw scan, whatever its placement: rigid start (both ways where it is ambiguous), identity and pose
-/// (fitModelToScan), the model's field where one is given, and the surface itself where asked for. With three landmarks
-/// or more the start comes from them. A fit that failed is not deformed further; nor does a field deform what next to
-/// no point of the scan lies on, which a warning says.
+/// (fitModelToScan), fingers and toes (seatTips), the model's field where one is given, and the surface itself where
+/// asked for. With three landmarks or more the start comes from them. A fit that failed is not deformed further; nor
+/// does a field deform what next to no point of the scan lies on, which a warning says.
 ///
 /// residual and termination are of the model's fit, or of the refinement where that did not converge. Throws
 /// InvalidInput naming an option, `scan` (requireUsableScan) or a landmark.

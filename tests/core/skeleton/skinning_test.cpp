@@ -5,6 +5,7 @@
 #include <numbers>
 
 #include "core/numerics/error.h"
+#include "core/skeleton/joint_reach.h"
 #include "core/skeleton/joint_regressor.h"
 #include "core/skeleton/rotation.h"
 #include "tests/support/rigs.h"
@@ -46,6 +47,22 @@ TEST_CASE("linear blend skinning agrees with products of homogeneous matrices") 
     CHECK((posed - literalSkinning(tube.rig, tube.mesh.vertices, pose)).cwiseAbs().maxCoeff() < 1e-13);
   }
   CHECK((skinned(tube.rig, tube.mesh.vertices, restPose(tube.rig.skeleton)) - tube.mesh.vertices).norm() < 1e-13);
+}
+
+TEST_CASE("a joint reaches as far as what it and the joints below it carry") {
+  // A chain of three, a metre apart, and a fourth on the second that carries nothing.
+  const Skeleton skeleton({{"a", -1}, {"b", 0}, {"c", 1}, {"d", 1}});
+  Vertices joints(4, 3), rest(3, 3);
+  joints << 0, 0, 0, 1, 0, 0, 2, 0, 0, 1, 1, 0;
+  rest << 0.5, 0, 0, 1, 0.2, 0, 4, 0, 0;
+  SkinWeights weights(3, 4);
+  weights.insert(0, 0) = 0.4;
+  weights.insert(0, 1) = 0.6;
+  weights.insert(1, 1) = 1;
+  weights.insert(2, 2) = 0.9;
+  weights.insert(2, 3) = 0.1;
+  weights.makeCompressed();
+  CHECK(jointReach(skeleton, weights, rest, joints) == std::vector<double>{4, 3, 2, 0});
 }
 
 TEST_CASE("the root's transform moves a body rigidly") {

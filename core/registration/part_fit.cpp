@@ -1,4 +1,4 @@
-#include "core/clothing/part_fit.h"
+#include "core/registration/part_fit.h"
 
 #include <Eigen/Cholesky>
 #include <algorithm>

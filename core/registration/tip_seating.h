@@ -1,0 +1,32 @@
+#pragma once
+
+#include "core/registration/part_fit.h"
+
+namespace shaped {
+
+/// Coarser than of a part that is all there is to fit: many tips are tried in many places.
+PartFitOptions tipFitDefaults();
+
+struct TipOptions {
+  double largest_reach = 0.12;  ///< of a tip (jointReach), m, >= 0; 0: no part is one
+  double tilt = 12;             ///< degrees, as from a finger to the next, (0, 180]
+  double least_gain = 0.1;      ///< what another place must save to be taken, in the measure of PartFit::cost, >= 0
+  PartFitOptions fit = tipFitDefaults();  ///< of a tip's joints, about rest
+
+  std::optional<std::string> firstViolation() const;  ///< "tilt = 0, want (0, 180] degrees"
+};
+
+/// The joints at which small parts at the ends of limbs begin, as fingers and toes: those that reach no further than
+/// largest_reach, below one that does.
+std::vector<std::int32_t> tipsOf(const BodyModel& model, double largest_reach);
+
+/// Seats fingers and toes that a descent may have left in their neighbours' places, where each is a good fit but for
+/// the outermost: each tip descends (PartFit) from where it stands, from there tilted to all sides, and from rest. The
+/// rest of the body is held, but that the joint above a tip gives way by a little.
+///
+/// Returns how many tips have another place in `pose`. Once the token has fired, those not tried stay. Throws
+/// InvalidInput naming an option.
+int seatTips(const ScanSurface& scan, const BodyModel& model, const Eigen::VectorXd& identity, Pose& pose,
+             const TipOptions& options = {}, const std::stop_token& stop = {});
+
+}  // namespace shaped
