@@ -122,7 +122,8 @@ FieldDeformation::FieldDeformation(std::shared_ptr<const FieldReference> referen
 }
 
 std::optional<DeformedBody> FieldDeformation::deform(const BodyModel& model, const BodyState& state,
-                                                     const ScanSurface& scan, const ModelFitOptions& fit) const {
+                                                     const ScanSurface& scan, const ModelFitOptions& fit,
+                                                     const TipOptions& tips) const {
   if (model.topology()->id() != reference_->poisson->topology().id())
     throw InvalidInput("model", "is of another topology than the field's reference: make the field's of this model");
   Scan seen = scanAtRest(model, state, scan);
@@ -144,7 +145,9 @@ std::optional<DeformedBody> FieldDeformation::deform(const BodyModel& model, con
     if (!jacobians.allFinite()) return std::nullopt;
     rest = reference_->poisson->solve(jacobians, features.centroids);
   }
-  const auto body = refitPose(model, rest, pose, scan, fit, regression_ ? PoseRefit::kFine : PoseRefit::kFull);
+  auto body = refitPose(model, rest, pose, scan, fit, regression_ ? PoseRefit::kFine : PoseRefit::kFull);
+  if (seatTips(scan, body.body, body.state.identity, body.state.pose, tips, fit.stop) > 0)
+    body = refitPose(model, rest, body.state.pose, scan, fit, PoseRefit::kFine);
   return DeformedBody{std::move(rest), body.state.pose, body.posed()};
 }
 

@@ -8,6 +8,7 @@
 #include "core/neural/jacobian_field.h"
 #include "core/registration/scan_surface.h"
 #include "core/registration/scan_to_model.h"
+#include "core/registration/tip_seating.h"
 
 namespace shaped {
 
@@ -53,13 +54,14 @@ class FieldDeformation {
   /// to X_o what it makes of the fit's evidence, and the pose is fitted anew. Then what smoothResidual makes of the
   /// scan as it then comes to rest, where the field comes with a prior for it; then the field, of the same scan, unless
   /// it is silent. It says nothing of places: at rest each component stays centred where it was. At last the pose of X'
-  /// is fitted to the scan (refitPose), as that of X_o has made up for what X_o lacked. fit: how.
+  /// is fitted to the scan (refitPose), as that of X_o has made up for what X_o lacked, and its tips are seated once
+  /// more (seatTips): those of X_o may have shifted on the way. fit, tips: how.
   ///
   /// Nothing when fewer than kFewestScanPoints points of the scan come to rest, or the field's single precision
   /// overflows on what it sees. Throws InvalidInput naming `model` when its topology is not the field's reference's, or
   /// `state`.
   std::optional<DeformedBody> deform(const BodyModel& model, const BodyState& state, const ScanSurface& scan,
-                                     const ModelFitOptions& fit = {}) const;
+                                     const ModelFitOptions& fit = {}, const TipOptions& tips = {}) const;
 
   const JacobianFieldWeights& weights() const { return field_.weights(); }
   /// Memory of reference and field, about.

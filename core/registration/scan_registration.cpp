@@ -103,7 +103,7 @@ void deformByField(const ScanSurface& surface, const BodyModel& model, const Sca
                    ScanRegistration& result) {
   auto fit = options.fit;
   fit.stop = options.stop;
-  auto deformed = options.field->deform(model, result.state, surface, fit);
+  auto deformed = options.field->deform(model, result.state, surface, fit, options.tips);
   if (!deformed) return;
   const auto report = ModelPairs(surface, model, options.fit).report(deformed->posed, options.fit.levels.back());
   result.field = FieldRegistration{std::move(deformed->rest), std::move(deformed->pose), report};
