@@ -25,7 +25,8 @@ class TrainMethod {
 
 /// Of --posture, "" for none given. Throws InvalidInput.
 v1::PostureNormalisation postureNamed(const std::string& text);
-/// A rig file as it travels; says on stderr where weights are far from summing to 1. Throws InvalidInput naming the file and what is wrong in it for such a mesh.
+/// A rig file as it travels; says on stderr where weights are far from summing to 1. Throws InvalidInput naming the file
+/// and what is wrong in it for such a mesh.
 std::string rigText(const std::string& file, Eigen::Index vertex_count);
 
 /// All of them, the one that is named first in the help first.

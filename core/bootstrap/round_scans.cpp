@@ -69,10 +69,9 @@ std::optional<FittedScan> RoundScans::fit(std::size_t scan, int round) const {
 Vertices RoundScans::restSurface(const FittedScan& fitted) const {
   const auto scan = scans.load(fitted.report.scan);
   const ScanSurface ready(preparedScan(scan, registration.unit_factor));
-  auto deformed = registration.field->deform(model, fitted.state, ready, registration.fit);
-  if (!deformed)
-    throw InvalidInput("scans", "\"" + fitted.report.name + "\" is no longer the scan that was registered");
-  return std::move(deformed->rest);
+  auto found = registration.field->atRest(model, fitted.state, ready, registration.fit);
+  if (!found) throw InvalidInput("scans", "\"" + fitted.report.name + "\" is no longer the scan that was registered");
+  return std::move(found->rest);
 }
 
 std::vector<std::size_t> scansToTry(std::size_t count, const std::vector<BootstrapRound>& rounds,

@@ -2,8 +2,8 @@
 
 #include <span>
 
-#include "core/registration/part_fit.h"
 #include "core/registration/limb_search.h"
+#include "core/registration/part_fit.h"
 
 namespace shaped {
 

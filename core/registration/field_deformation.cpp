@@ -121,9 +121,8 @@ FieldDeformation::FieldDeformation(std::shared_ptr<const FieldReference> referen
   if (const auto& regression = field_.weights().regression) regression_.emplace(*regression);
 }
 
-std::optional<DeformedBody> FieldDeformation::deform(const BodyModel& model, const BodyState& state,
-                                                     const ScanSurface& scan, const ModelFitOptions& fit,
-                                                     const TipOptions& tips) const {
+std::optional<RestBody> FieldDeformation::atRest(const BodyModel& model, const BodyState& state,
+                                                 const ScanSurface& scan, const ModelFitOptions& fit) const {
   if (model.topology()->id() != reference_->poisson->topology().id())
     throw InvalidInput("model", "is of another topology than the field's reference: make the field's of this model");
   Scan seen = scanAtRest(model, state, scan);
@@ -145,10 +144,18 @@ std::optional<DeformedBody> FieldDeformation::deform(const BodyModel& model, con
     if (!jacobians.allFinite()) return std::nullopt;
     rest = reference_->poisson->solve(jacobians, features.centroids);
   }
-  auto body = refitPose(model, rest, pose, scan, fit, regression_ ? PoseRefit::kFine : PoseRefit::kFull);
+  return RestBody{std::move(rest), std::move(pose)};
+}
+
+std::optional<DeformedBody> FieldDeformation::deform(const BodyModel& model, const BodyState& state,
+                                                     const ScanSurface& scan, const ModelFitOptions& fit,
+                                                     const TipOptions& tips) const {
+  auto found = atRest(model, state, scan, fit);
+  if (!found) return std::nullopt;
+  auto body = refitPose(model, found->rest, found->pose, scan, fit, regression_ ? PoseRefit::kFine : PoseRefit::kFull);
   if (seatTips(scan, body.body, body.state.identity, body.state.pose, tips, fit.stop) > 0)
-    body = refitPose(model, rest, body.state.pose, scan, fit, PoseRefit::kFine);
-  return DeformedBody{std::move(rest), body.state.pose, body.posed()};
+    body = refitPose(model, found->rest, body.state.pose, scan, fit, PoseRefit::kFine);
+  return DeformedBody{std::move(found->rest), body.state.pose, body.posed()};
 }
 
 std::size_t FieldDeformation::bytes() const {

@@ -33,6 +33,12 @@ Scan scanAtRest(const BodyModel& model, const BodyState& state, const ScanSurfac
 Vertices smoothDisplacements(const FieldReference& reference, const SmoothPrior& prior, const Vertices& rest,
                              const Scan& scan);
 
+/// A body at rest as a field makes it, and the pose in which the field saw the scan.
+struct RestBody {
+  Vertices rest;  ///< X' of [Mur25] Algorithm 2, V x 3, in the model's rest pose
+  Pose pose;      ///< not yet fitted to X'
+};
+
 /// A body's surface as a field sees it on a scan.
 struct DeformedBody {
   Vertices rest;   ///< X' of [Mur25] Algorithm 2, V x 3, in the model's rest pose
@@ -50,16 +56,21 @@ class FieldDeformation {
                                                       const std::stop_token& stop = {});
   FieldDeformation(std::shared_ptr<const FieldReference> reference, JacobianFieldWeights weights);
 
-  /// X_o = model.rest(state.identity) deformed to X'. Where the field comes with a regression, that goes first: it adds
-  /// to X_o what it makes of the fit's evidence, and the pose is fitted anew. Then what smoothResidual makes of the
-  /// scan as it then comes to rest, where the field comes with a prior for it; then the field, of the same scan, unless
-  /// it is silent. It says nothing of places: at rest each component stays centred where it was. At last the pose of X'
-  /// is fitted to the scan (refitPose), as that of X_o has made up for what X_o lacked, and its tips are seated once
-  /// more (seatTips): those of X_o may have shifted on the way. fit, tips: how.
+  /// X_o = model.rest(state.identity) deformed to X' at rest. Where the field comes with a regression, that goes first:
+  /// it adds to X_o what it makes of the fit's evidence, and the pose is fitted anew. Then what smoothResidual makes of
+  /// the scan as it then comes to rest, where the field comes with a prior for it; then the field, of the same scan,
+  /// unless it is silent. It says nothing of places: at rest each component stays centred where it was. fit: how poses
+  /// are fitted.
   ///
   /// Nothing when fewer than kFewestScanPoints points of the scan come to rest, or the field's single precision
   /// overflows on what it sees. Throws InvalidInput naming `model` when its topology is not the field's reference's, or
   /// `state`.
+  std::optional<RestBody> atRest(const BodyModel& model, const BodyState& state, const ScanSurface& scan,
+                                 const ModelFitOptions& fit = {}) const;
+
+  /// The same on the scan: the pose of X' is fitted to it (refitPose), as that of X_o has made up for what X_o lacked,
+  /// and its tips are seated once more (seatTips), as those of X_o may have shifted on the way. tips: how; else as
+  /// atRest().
   std::optional<DeformedBody> deform(const BodyModel& model, const BodyState& state, const ScanSurface& scan,
                                      const ModelFitOptions& fit = {}, const TipOptions& tips = {}) const;
 

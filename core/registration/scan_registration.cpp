@@ -8,7 +8,6 @@
 #include "core/numerics/error.h"
 #include "core/registration/model_pairs.h"
 #include "core/registration/scan_checks.h"
-#include "core/registration/tip_seating.h"
 
 namespace shaped {
 namespace {

@@ -1,6 +1,7 @@
 #include "core/registration/tip_seating.h"
 
 #include <Eigen/Geometry>
+#include <array>
 #include <catch2/catch.hpp>
 #include <numbers>
 
@@ -9,6 +10,7 @@
 #include "core/registration/scan_registration.h"
 #include "core/skeleton/rotation.h"
 #include "tests/core/registration/scanned_shapes.h"
+#include "tests/support/fields.h"
 
 using namespace shaped;
 using namespace shaped::test;
@@ -157,4 +159,27 @@ TEST_CASE("registering seats fingers that the fit left beside their places") {
   CHECK(errorOf(model, seated.solution.state, truth) < 1.5e-3);
   CHECK(seated.iterations > left.iterations);
   CHECK(seated.solution.report.chamfer < left.solution.report.chamfer);
+}
+
+TEST_CASE("a pose fitted anew for a field's surface has its tips seated") {
+  const auto model = handModel();
+  const BodyState truth = model.meanState();
+  BodyState shifted = truth;
+  shifted.pose.rotations(kFingers, 2) = -kPitch;
+  const ScanSurface scan(threeFingers(model, truth));
+  const auto reference =
+      std::make_shared<const FieldReference>(*makeFieldReference(model.topology(), model.parts().mean));
+  const FieldDeformation silent(reference, constantField(scalingOf(*reference)));
+  ModelFitOptions finest;
+  finest.levels.erase(finest.levels.begin(), finest.levels.end() - 1);
+  const Vertices surface = model.posed(truth).vertices();
+  const auto seated = silent.deform(model, shifted, scan, finest);
+  TipOptions none;
+  none.largest_reach = 0;
+  const auto left = silent.deform(model, shifted, scan, finest, none);
+  REQUIRE((seated && left));
+  CHECK(meanVertexDistance(left->posed, surface) > 3e-3);
+  CHECK(meanVertexDistance(seated->posed, surface) < 1.5e-3);
+  CHECK(seated->rest == left->rest);
+  CHECK(seated->rest == silent.atRest(model, shifted, scan, finest)->rest);
 }
