@@ -118,7 +118,7 @@ bool seatExtremity(const ScanSurface& scan, const BodyModel& model, const Eigen:
                    const std::stop_token& stop) {
   if (const auto problem = options.firstViolation()) throw InvalidInput("extremity options", *problem);
   const Pose likely = medianOf(model.skeleton(), others);
-  const PartFit fit(scan, model, identity, joint, pose, likely, options.fit);
+  const PartFit fit(scan, StandingBody(model, {identity, pose}), joint, likely, options.fit);
   if (!fit.tells()) return false;
   const Tried best = Seating(model, identity, fit, options, stop).best(pose, others);
   if (stop.stop_requested() || !(best.first < fit.cost(pose) - options.least_gain)) return false;

@@ -7,11 +7,8 @@
 #include <limits>
 #include <numeric>
 
-#include "core/mesh/quality.h"
 #include "core/numerics/option_checks.h"
-#include "core/registration/deformation.h"
 #include "core/registration/limb_search.h"
-#include "core/registration/surface_samples.h"
 #include "core/surface/point_tree.h"
 
 namespace shaped {
@@ -34,6 +31,16 @@ std::vector<Value> thinned(const std::vector<Value>& all, int most) {
   std::vector<Value> some;
   for (std::size_t i = 0; i < all.size(); i += stride) some.push_back(all[i]);
   return some;
+}
+
+/// Whether these joints carry a vertex for the most part, for each.
+std::vector<bool> carriedBy(const std::vector<std::int32_t>& joints, const SkinWeights& weights) {
+  Eigen::VectorXd mine = Eigen::VectorXd::Zero(weights.cols());
+  for (const auto joint : joints) mine[joint] = 1;
+  const Eigen::VectorXd shares = weights * mine;
+  std::vector<bool> carried;
+  for (const double share : shares) carried.push_back(share > 0.5);
+  return carried;
 }
 
 /// Points of the posed body outside the part: what of the scan lies on them is not the part's.
@@ -73,45 +80,34 @@ std::optional<std::string> PartFitOptions::firstViolation() const {
   return std::nullopt;
 }
 
-PartFit::PartFit(const ScanSurface& scan, const BodyModel& model, const Eigen::VectorXd& identity, std::int32_t joint,
-                 const Pose& pose, const Pose& likely, const PartFitOptions& options)
-    : model_(model),
+PartFit::PartFit(const ScanSurface& scan, const StandingBody& body, std::int32_t joint, const Pose& likely,
+                 const PartFitOptions& options)
+    : model_(body.model()),
       options_(options),
       oriented_(scan.hasOrientedNormals()),
       likely_(likely),
-      rest_joints_(model.restJoints(identity)) {
-  for (std::int32_t j = joint; j < model.skeleton().jointCount(); ++j)
-    if (hangsBelow(model.skeleton(), j, joint)) joints_.push_back(j);
-  moving_ = {model.skeleton().parent(joint)};
+      rest_joints_(body.restJoints()) {
+  for (std::int32_t j = joint; j < model_.skeleton().jointCount(); ++j)
+    if (hangsBelow(model_.skeleton(), j, joint)) joints_.push_back(j);
+  moving_ = {model_.skeleton().parent(joint)};
   moving_.insert(moving_.end(), joints_.begin(), joints_.end());
   deviations_.assign(moving_.size(), options.pose_deviation);
   deviations_[0] = options.parent_deviation;
-  likely_.rotations.row(moving_[0]) = pose.rotations.row(moving_[0]);
-  chooseVertices(identity);
-  chooseScanPoints(scan, identity, pose);
+  likely_.rotations.row(moving_[0]) = body.pose().rotations.row(moving_[0]);
+  const auto mine = carriedBy(joints_, model_.parts().weights);
+  chooseVertices(body, mine);
+  chooseScanPoints(scan, body, mine);
 }
 
 bool PartFit::tells() const { return Eigen::Index(vertices_.size()) >= kLeastPoints && scan_.cols() >= kLeastPoints; }
 
-/// Whether the part's joints carry a vertex for the most part.
-std::vector<bool> PartFit::carried() const {
-  Eigen::VectorXd mine = Eigen::VectorXd::Zero(model_.skeleton().jointCount());
-  for (const auto j : joints_) mine[j] = 1;
-  const Eigen::VectorXd shares = model_.parts().weights * mine;
-  std::vector<bool> carried;
-  for (const double share : shares) carried.push_back(share > 0.5);
-  return carried;
-}
-
-void PartFit::chooseVertices(const Eigen::VectorXd& identity) {
-  const auto mine = carried();
+void PartFit::chooseVertices(const StandingBody& body, const std::vector<bool>& mine) {
   std::vector<std::int32_t> part;
   for (std::size_t v = 0; v < mine.size(); ++v)
     if (mine[v]) part.push_back(std::int32_t(v));
   vertices_ = thinned(part, options_.points);
-  const Vertices rest = model_.rest(identity), normals = vertexNormals(model_.topology()->faces(), rest);
-  rest_ = rest(vertices_, Eigen::all);
-  rest_normals_ = normals(vertices_, Eigen::all);
+  rest_ = body.rest()(vertices_, Eigen::all);
+  rest_normals_ = body.restNormals()(vertices_, Eigen::all);
   weights_ = SkinWeights(Eigen::Index(vertices_.size()), model_.skeleton().jointCount());
   for (std::size_t i = 0; i < vertices_.size(); ++i)
     for (SkinWeights::InnerIterator entry(model_.parts().weights, vertices_[i]); entry; ++entry)
@@ -119,22 +115,17 @@ void PartFit::chooseVertices(const Eigen::VectorXd& identity) {
   weights_.makeCompressed();
 }
 
-void PartFit::chooseScanPoints(const ScanSurface& scan, const Eigen::VectorXd& identity, const Pose& pose) {
-  const auto& faces = model_.topology()->faces();
-  const PosedSkin body = model_.posed({identity, pose});
-  const Eigen::VectorXd areas = areaShares(faces, body.vertices());
-  const auto& bones = body.skeleton().joints;
-  centre_ = bones.row(joints_.front());
-  const Eigen::RowVector3d bone = (centre_ - bones.row(moving_.front())).normalized();
-  const auto mine = carried();
+void PartFit::chooseScanPoints(const ScanSurface& scan, const StandingBody& body, const std::vector<bool>& mine) {
+  centre_ = body.joints().row(joints_.front());
+  const Eigen::RowVector3d bone = (centre_ - body.joints().row(moving_.front())).normalized();
   double share = 0, length = 0;
   std::vector<std::int32_t> others;
-  for (Eigen::Index v = 0; v < areas.size(); ++v)
+  for (Eigen::Index v = 0; v < body.areas().size(); ++v)
     if (mine[std::size_t(v)])
-      share += areas[v], length = std::max(length, (body.vertices().row(v) - centre_).norm());
+      share += body.areas()[v], length = std::max(length, (body.vertices().row(v) - centre_).norm());
     else
       others.push_back(std::int32_t(v));
-  const RestOfBody rest(body.vertices(), vertexNormals(faces, body.vertices()), thinned(others, kRestPoints));
+  const RestOfBody rest(body.vertices(), body.normals(), thinned(others, kRestPoints));
   std::vector<Eigen::Index> open;
   for (Eigen::Index s = 0; s < scan.points().rows(); ++s) {
     const Eigen::RowVector3d away = scan.points().row(s) - centre_;

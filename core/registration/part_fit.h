@@ -5,8 +5,8 @@
 #include <string>
 #include <vector>
 
-#include "core/body/body_model.h"
 #include "core/registration/scan_surface.h"
+#include "core/registration/standing_body.h"
 
 namespace shaped {
 
@@ -31,10 +31,11 @@ struct PartFitOptions {
 /// one that the body lacks goes unseen, and the two sides of a hand are told apart.
 class PartFit {
  public:
-  /// All must outlive it. pose: where the rest of the body stands; likely: what the part's joints are drawn to where
-  /// the scan says little. Scan points that the rest of the body lies on, or that lie behind `joint`, take no part.
-  PartFit(const ScanSurface& scan, const BodyModel& model, const Eigen::VectorXd& identity, std::int32_t joint,
-          const Pose& pose, const Pose& likely, const PartFitOptions& options);
+  /// The body's model and the options must outlive it. body: where the rest of it stands; likely: what the part's
+  /// joints are drawn to where the scan says little. Scan points that the rest of the body lies on, or that lie behind
+  /// `joint`, take no part.
+  PartFit(const ScanSurface& scan, const StandingBody& body, std::int32_t joint, const Pose& likely,
+          const PartFitOptions& options);
 
   /// `joint` and those below it; not the one above, which the descent moves too.
   const std::vector<std::int32_t>& joints() const { return joints_; }
@@ -60,9 +61,8 @@ class PartFit {
     std::vector<Pair> outward, back;  ///< of each of the part's points, and of each of the scan's
   };
 
-  std::vector<bool> carried() const;
-  void chooseVertices(const Eigen::VectorXd& identity);
-  void chooseScanPoints(const ScanSurface& scan, const Eigen::VectorXd& identity, const Pose& pose);
+  void chooseVertices(const StandingBody& body, const std::vector<bool>& mine);
+  void chooseScanPoints(const ScanSurface& scan, const StandingBody& body, const std::vector<bool>& mine);
   /// share: of the body's surface that is the part's.
   void keepScanPoints(const ScanSurface& scan, const std::vector<Eigen::Index>& open, double share);
   PosedSkin skinOf(const Pose& pose) const;

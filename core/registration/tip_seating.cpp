@@ -51,7 +51,8 @@ PartFitOptions tipFitDefaults() {
 
 std::optional<std::string> TipOptions::firstViolation() const {
   if (const auto problem = fit.firstViolation()) return "fit." + *problem;
-  if (!(largest_reach >= 0)) return "largest_reach = " + std::to_string(largest_reach) + ", want >= 0";
+  for (const double reach : reaches)
+    if (!(reach >= 0)) return "reaches holds " + std::to_string(reach) + ", want >= 0";
   if (!(tilt > 0 && tilt <= 180)) return "tilt = " + std::to_string(tilt) + ", want (0, 180] degrees";
   if (!(least_gain >= 0) || !std::isfinite(least_gain))
     return "least_gain = " + std::to_string(least_gain) + ", want >= 0";
@@ -73,15 +74,22 @@ std::vector<std::int32_t> tipsOf(const BodyModel& model, double largest_reach) {
 int seatTips(const ScanSurface& scan, const BodyModel& model, const Eigen::VectorXd& identity, Pose& pose,
              const TipOptions& options, const std::stop_token& stop) {
   if (const auto problem = options.firstViolation()) throw InvalidInput("tip options", *problem);
-  const Vertices joints = model.restJoints(identity);
+  std::vector<std::int32_t> tips;
+  for (const double reach : options.reaches)
+    for (const auto joint : tipsOf(model, reach)) tips.push_back(joint);
+  const Pose likely = restPose(model.skeleton());
+  std::optional<StandingBody> body(std::in_place, model, BodyState{identity, pose});
   int seated = 0;
-  for (const auto joint : tipsOf(model, options.largest_reach)) {
-    const PartFit fit(scan, model, identity, joint, pose, restPose(model.skeleton()), options.fit);
-    const Eigen::RowVector3d bone = joints.row(joint) - joints.row(model.skeleton().parent(joint));
-    if (stop.stop_requested() || !fit.tells() || bone.isZero(0)) continue;
+  for (const auto joint : tips) {
+    if (stop.stop_requested()) break;
+    const PartFit fit(scan, *body, joint, likely, options.fit);
+    const Eigen::RowVector3d bone =
+        body->restJoints().row(joint) - body->restJoints().row(model.skeleton().parent(joint));
+    if (!fit.tells() || bone.isZero(0)) continue;
     const Tried best = bestOf(fit, places(fit, bone, pose, options.tilt));
     if (!(best.first < fit.cost(pose) - options.least_gain)) continue;
     pose = best.second;
+    body.emplace(model, BodyState{identity, pose});
     ++seated;
   }
   return seated;

@@ -8,9 +8,11 @@ namespace shaped {
 PartFitOptions tipFitDefaults();
 
 struct TipOptions {
-  double largest_reach = 0.12;  ///< of a tip (jointReach), m, >= 0; 0: no part is one
-  double tilt = 12;             ///< degrees, as from a finger to the next, (0, 180]
-  double least_gain = 0.1;      ///< what another place must save to be taken, in the measure of PartFit::cost, >= 0
+  /// How far parts reach (jointReach) that are seated one kind after the other, m, each >= 0: hands and feet, then
+  /// fingers and toes. A hand turned in the wrist has all fingers one place off, and no finger alone finds back.
+  std::vector<double> reaches = {0.22, 0.12};
+  double tilt = 12;         ///< degrees, as from a finger to the next, (0, 180]
+  double least_gain = 0.1;  ///< what another place must save to be taken, in the measure of PartFit::cost, >= 0
   PartFitOptions fit = tipFitDefaults();  ///< of a tip's joints, about rest
 
   std::optional<std::string> firstViolation() const;  ///< "tilt = 0, want (0, 180] degrees"
@@ -20,9 +22,10 @@ struct TipOptions {
 /// largest_reach, below one that does.
 std::vector<std::int32_t> tipsOf(const BodyModel& model, double largest_reach);
 
-/// Seats fingers and toes that a descent may have left in their neighbours' places, where each is a good fit but for
-/// the outermost: each tip descends (PartFit) from where it stands, from there tilted to all sides, and from rest. The
-/// rest of the body is held, but that the joint above a tip gives way by a little.
+/// Seats hands, feet, fingers and toes that a descent may have left in their neighbours' places, where each finger is a
+/// good fit but for the outermost: each such tip descends (PartFit) from where it stands, from there tilted to all
+/// sides, and with its joints at rest. The rest of the body is held, but that the joint above a tip gives way by a
+/// little.
 ///
 /// Returns how many tips have another place in `pose`. Once the token has fired, those not tried stay. Throws
 /// InvalidInput naming an option.

@@ -148,7 +148,7 @@ TEST_CASE("the cost of a part is least in its place, and a descent never ends ab
   const Arm arm;
   const ScanSurface scan(arm.scan());
   const PartFitOptions options;
-  const PartFit fit(scan, arm.model, arm.truth.identity, kHand, arm.truth.pose, arm.truth.pose, options);
+  const PartFit fit(scan, StandingBody(arm.model, arm.truth), kHand, arm.truth.pose, options);
   REQUIRE(fit.tells());
   CHECK(fit.joints() == std::vector<std::int32_t>{kHand, kFingers});
   const double there = fit.cost(arm.truth.pose);
