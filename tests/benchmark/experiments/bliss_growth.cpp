@@ -4,11 +4,14 @@
 
 #include <algorithm>
 #include <cstdlib>
+#include <filesystem>
+#include <sstream>
 #include <utility>
 
 #include "core/mesh/alignment.h"
 #include "core/mesh/quality.h"
 #include "core/registration/field_deformation.h"
+#include "core/skeleton/foremost_joint.h"
 #include "core/training/field_training.h"
 #include "tests/benchmark/experiments/timing.h"
 
@@ -48,18 +51,47 @@ struct Snapshot {
   JacobianFieldWeights field;
 };
 
-std::vector<Snapshot> snapshotsOf(const BootstrapInputs& inputs, const BootstrapOptions& options, int epochs,
-                                  bool first_only, std::vector<BootstrapRound>& rounds) {
+Snapshot snapshotOf(BootstrapCheckpoint&& state) {
+  return {state.rounds.size(), std::move(state.joined), std::move(*state.field)};
+}
+
+/// Where the state after a training is kept; nothing where SHAPED_KEEP names no folder.
+std::optional<std::filesystem::path> keptAt(const std::string& name, std::size_t training) {
+  const char* folder = std::getenv("SHAPED_KEEP");
+  if (!folder) return std::nullopt;
+  std::filesystem::create_directories(folder);
+  return std::filesystem::path(folder) / (name + "-" + std::to_string(training) + ".checkpoint");
+}
+
+/// Those of an earlier run.
+std::vector<Snapshot> keptSnapshots(const std::string& name) {
   std::vector<Snapshot> snapshots;
+  for (auto path = keptAt(name, 1); path && std::filesystem::exists(*path); path = keptAt(name, snapshots.size() + 1))
+    snapshots.push_back(snapshotOf(readBootstrapCheckpoint(*path)));
+  return snapshots;
+}
+
+void tellRound(const BootstrapRound& round) {
+  std::printf("  round %d: %zu registrations, %zu scans tried, %zu joined below %.2f mm of %.2f to %.2f\n", round.round,
+              round.registrations, round.scans.size(), round.joined, 1000 * round.accepted_below, 1000 * round.smallest,
+              1000 * round.largest);
+  std::fflush(stdout);
+}
+
+std::vector<Snapshot> snapshotsOf(const BootstrapInputs& inputs, const BootstrapOptions& options, int epochs,
+                                  bool first_only, const std::string& name) {
+  auto snapshots = keptSnapshots(name);
+  if (!snapshots.empty()) return snapshots;
   std::stop_source stop;
   BootstrapWatch watch;
   watch.stop = stop.get_token();
   int seen = 0;
   watch.checkpoint = [&](const auto& state) {
-    const auto now = state();
+    auto now = state();
     if (now.trainings == seen || !now.field) return;
     seen = now.trainings;
-    snapshots.push_back({now.rounds.size(), now.joined, *now.field});
+    if (const auto path = keptAt(name, snapshots.size() + 1)) writeBootstrapCheckpoint(*path, now);
+    snapshots.push_back(snapshotOf(std::move(now)));
     if (first_only) stop.request_stop();
   };
   watch.progress = [](const Progress& progress) {
@@ -67,22 +99,41 @@ std::vector<Snapshot> snapshotsOf(const BootstrapInputs& inputs, const Bootstrap
     std::printf("  %s\n", progress.stage.c_str());
     std::fflush(stdout);
   };
-  watch.each_round = [&](const BootstrapRound& round) {
-    rounds.push_back(round);
-    std::printf("  round %d: %zu registrations, %zu scans tried, %zu joined below %.2f mm of %.2f to %.2f\n",
-                round.round, round.registrations, round.scans.size(), round.joined, 1000 * round.accepted_below,
-                1000 * round.smallest, 1000 * round.largest);
-    std::fflush(stdout);
-  };
+  watch.each_round = tellRound;
   bootstrapBody(inputs, trainerOf(epochs), options, watch);
   return snapshots;
+}
+
+/// Those that SHAPED_TRIALS lists, as "1,21"; without it all.
+std::vector<Trial> chosen(const std::vector<Trial>& trials) {
+  const char* list = std::getenv("SHAPED_TRIALS");
+  if (!list) return trials;
+  std::vector<Trial> some;
+  std::istringstream numbers(list);
+  for (std::string number; std::getline(numbers, number, ',');) some.push_back(trials.at(std::stoul(number)));
+  return some;
 }
 
 /// Mean distances over all trials, mm, and how those of registrations where they stand are spread.
 struct Measured {
   double model_posed = 0, model_rest = 0, posed = 0, rest = 0, seconds = 0;
   double median = 0, worst = 0;
+  std::string furthest = {};  ///< of one trial: where it is furthest off
 };
+
+/// The joint whose vertices lie furthest from the truth on average, as "RHand 24.1".
+std::string worstJoint(const BodyModel& model, const Vertices& posed, const Vertices& truth) {
+  const auto& skeleton = model.skeleton();
+  Eigen::ArrayXd sums = Eigen::ArrayXd::Zero(skeleton.jointCount()), counts = sums;
+  for (std::int32_t v = 0; v < posed.rows(); ++v) {
+    const auto joint = foremostJoint(model.parts().weights, v);
+    sums[joint] += 1000 * (posed.row(v) - truth.row(v)).norm();
+    counts[joint] += 1;
+  }
+  Eigen::Index worst;
+  const double distance = (sums / counts.max(1)).maxCoeff(&worst);
+  return text("%s %.1f", skeleton.name(std::int32_t(worst)).c_str(), distance);
+}
 
 double distanceAtRest(const Vertices& shape, const Vertices& truth) {
   return 1000 * meanVertexDistance(apply(alignRigidly(shape, truth), shape), truth);
@@ -106,11 +157,12 @@ Measured measured(const BodyModel& model, const ScanRegistrationOptions& registr
     each[i] = {1000 * meanVertexDistance(model.posed(found.state).vertices(), posed),
                distanceAtRest(model.rest(found.state.identity), rest), 1000 * meanVertexDistance(found.vertices, posed),
                found.field ? distanceAtRest(found.field->rest, rest) : 0};
+    each[i].furthest = worstJoint(model, found.vertices, posed);
   });
   if (std::getenv("SHAPED_EACH"))
     for (std::size_t i = 0; i < each.size(); ++i)
-      std::printf("  trial %zu: posed %.2f (model %.2f), rest %.2f (model %.2f) mm\n", i, each[i].posed,
-                  each[i].model_posed, each[i].rest, each[i].model_rest);
+      std::printf("  trial %zu: posed %.2f (model %.2f), rest %.2f (model %.2f) mm, furthest %s\n", i, each[i].posed,
+                  each[i].model_posed, each[i].rest, each[i].model_rest, each[i].furthest.c_str());
   Measured sum;
   const double count = double(trials.size());
   for (const auto& one : each) {
@@ -166,22 +218,23 @@ int setting(const char* name, int otherwise) {
   return text ? std::atoi(text) : otherwise;
 }
 
-void grow(Report& report, BootstrapInputs inputs, const BootstrapOptions& options, const std::vector<Trial>& trials) {
+void grow(Report& report, BootstrapInputs inputs, const BootstrapOptions& options,
+          const std::vector<Trial>& all_trials) {
+  const auto trials = chosen(all_trials);
   if (setting("SHAPED_BASELINES", 1) != 0) tellBaselines(report, inputs, options, trials);
   const int epochs = setting("SHAPED_EPOCHS", 20);
-  std::vector<BootstrapRound> rounds;
-  const auto snapshots = snapshotsOf(inputs, options, epochs, false, rounds);
-  for (std::size_t s = 0; s < snapshots.size(); ++s)
+  const auto snapshots = snapshotsOf(inputs, options, epochs, false, "grown");
+  for (const auto& snapshot : snapshots)
     tell(report,
-         text("after %zu rounds, %zu registrations", snapshots[s].rounds,
-              modelRegistrations(inputs, options, snapshots[s].rounds, snapshots[s].joined).size()),
-         measured(inputs, options, snapshots[s], trials));
+         text("after %zu rounds, %zu registrations", snapshot.rounds,
+              modelRegistrations(inputs, options, snapshot.rounds, snapshot.joined).size()),
+         measured(inputs, options, snapshot, trials));
   for (std::size_t i = 0, count = inputs.registrations.size(); i < count; ++i)
     inputs.examples.push_back({inputs.registrations[i], std::nullopt});
   inputs.registrations.clear();
   for (const auto& example : inputs.examples) inputs.registrations.push_back(example.registration);
-  const auto all = snapshotsOf(inputs, options, epochs, true, rounds);
-  tell(report, "model and field of all registrations", measured(inputs, options, all.front(), trials));
+  const auto whole = snapshotsOf(inputs, options, epochs, true, "all");
+  tell(report, "model and field of all registrations", measured(inputs, options, whole.front(), trials));
 }
 
 BootstrapInputs growthInputs(const PostureTemplate& reference, const std::vector<Vertices>& known,

@@ -26,6 +26,10 @@ BootstrapOptions growthOptions();
 
 /// Tells what template fitting makes of the first model's fits, what the model and its field make of the trials before
 /// each round and at the end, then what a model and a field of all registrations at once do.
+///
+/// SHAPED_KEEP names a folder where the state after each training is kept. A run that finds states there measures them
+/// instead of learning anew, which makes minutes of half an hour where single trials are looked into: SHAPED_TRIALS
+/// lists them ("1,21"), SHAPED_EACH tells each.
 void grow(Report& report, BootstrapInputs inputs, const BootstrapOptions& options, const std::vector<Trial>& trials);
 
 }  // namespace shaped::experiments
