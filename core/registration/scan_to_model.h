@@ -25,7 +25,7 @@ struct ModelFitOptions {
   std::vector<ModelFitLevel> levels = {{500, 0.40, 0.15, 0.050, false, 12},
                                        {1000, 0.20, 0.06, 0.020, true, 12},
                                        {3000, 0.10, 0.03, 0.008, true, 10},
-                                       {20000, 0.05, 0.015, 0.005, true, 6}};
+                                       {20000, 0.05, 0.015, 0.005, true, 12}};
   double max_normal_angle = 60;  ///< gate, degrees, (0, 180]
   bool reject_boundary = true;   ///< gate
   bool identity = true;          ///< whether the identity may change, or the pose alone
