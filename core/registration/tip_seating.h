@@ -1,5 +1,7 @@
 #pragma once
 
+#include <array>
+
 #include "core/registration/part_fit.h"
 
 namespace shaped {
@@ -8,9 +10,9 @@ namespace shaped {
 PartFitOptions tipFitDefaults();
 
 struct TipOptions {
-  /// How far parts reach (jointReach) that are seated one kind after the other, m, each >= 0: hands and feet, then
-  /// fingers and toes. A hand turned in the wrist has all fingers one place off, and no finger alone finds back.
-  std::vector<double> reaches = {0.22, 0.12};
+  /// How far parts reach (jointReach) that are seated one kind after the other, m, each >= 0 (0: none): hands and feet,
+  /// then fingers and toes. A hand turned in the wrist has all fingers one place off, and no finger alone finds back.
+  std::array<double, 2> reaches = {0.22, 0.12};
   double tilt = 12;         ///< degrees, as from a finger to the next, (0, 180]
   double least_gain = 0.1;  ///< what another place must save to be taken, in the measure of PartFit::cost, >= 0
   PartFitOptions fit = tipFitDefaults();  ///< of a tip's joints, about rest

@@ -130,7 +130,7 @@ TEST_CASE("fingers in their neighbours' places are seated, and those that lie ri
   CHECK(seatTips(scan, model, truth.identity, right) == 0);
   CHECK(right.rotations == truth.pose.rotations);
   TipOptions none;
-  none.reaches.clear();
+  none.reaches = {0, 0};
   CHECK(seatTips(scan, model, truth.identity, right, none) == 0);
   none.tilt = 0;
   CHECK_THROWS_WITH(seatTips(scan, model, truth.identity, right, none),
@@ -155,7 +155,7 @@ TEST_CASE("a hand turned in its wrist is seated, which its fingers alone are not
   CHECK(seatTips(scan, model, seated.identity, seated.pose) == 1);
   CHECK(errorOf(model, seated, truth) < 1.5e-3);
   TipOptions fingers;
-  fingers.reaches = {0.12};
+  fingers.reaches = {0, 0.12};
   seatTips(scan, model, turned.identity, turned.pose, fingers);
   CHECK(errorOf(model, turned, truth) > 3e-3);
 }
@@ -169,7 +169,7 @@ TEST_CASE("registering seats fingers that the fit left beside their places") {
   options.fit.levels.erase(options.fit.levels.begin(), options.fit.levels.end() - 1);
   const Scan scan = threeFingers(model, truth);
   const auto seated = registerScanFrom(scan, model, shifted, {}, options);
-  options.tips.reaches.clear();
+  options.tips.reaches = {0, 0};
   const auto left = registerScanFrom(scan, model, shifted, {}, options);
   CHECK(errorOf(model, left.solution.state, truth) > 3e-3);
   CHECK(errorOf(model, seated.solution.state, truth) < 1.5e-3);
@@ -191,7 +191,7 @@ TEST_CASE("a pose fitted anew for a field's surface has its tips seated") {
   const Vertices surface = model.posed(truth).vertices();
   const auto seated = silent.deform(model, shifted, scan, finest);
   TipOptions none;
-  none.reaches.clear();
+  none.reaches = {0, 0};
   const auto left = silent.deform(model, shifted, scan, finest, none);
   REQUIRE((seated && left));
   CHECK(meanVertexDistance(left->posed, surface) > 3e-3);
