@@ -162,7 +162,10 @@ class Balancing(unittest.TestCase):
         """The control: what the retries are for. And nothing but calls in flight fails."""
         config = json.loads(ROUND_ROBIN)
         del config["methodConfig"]
-        load = self.kill_and_restart_under_load(self.both(), signal.SIGKILL, json.dumps(config))
+        for _ in range(5):  # a kill may fall between two calls
+            load = self.kill_and_restart_under_load(self.both(), signal.SIGKILL, json.dumps(config))
+            if load.failures:
+                break
         self.assertEqual({code for code, _ in load.failures}, {"UNAVAILABLE"})
         self.assertLessEqual(len(load.failures), 2 * CALLERS)
 
