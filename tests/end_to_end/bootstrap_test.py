@@ -256,7 +256,7 @@ class Interrupted(unittest.TestCase):
     def job(self, id):
         return next(job for job in DaemonCase.shapectl("jobs").json["jobs"] if job["id"] == id)
 
-    def wait_for(self, id, reached, timeout=240):
+    def wait_for(self, id, reached, timeout=900):  # jobs give way to all else on the machine
         until = time.monotonic() + timeout
         while time.monotonic() < until:
             job = self.job(id)

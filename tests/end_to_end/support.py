@@ -123,7 +123,7 @@ class DaemonCase(unittest.TestCase):
 
     @classmethod
     def shapectl(cls, *words):
-        return Result(subprocess.run(cls.command(*words), capture_output=True, text=True, timeout=300))
+        return Result(subprocess.run(cls.command(*words), capture_output=True, text=True, timeout=900))
 
     def expect(self, code, *words):
         result = self.shapectl(*words)
