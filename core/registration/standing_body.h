@@ -8,10 +8,10 @@ namespace shaped {
 class StandingBody {
  public:
   /// Throws InvalidInput naming what does not fit the model.
-  StandingBody(const BodyModel& model, BodyState state);
+  StandingBody(const BodyModel& model, const BodyState& state);
 
   const BodyModel& model() const { return model_; }
-  const Pose& pose() const { return state_.pose; }
+  const Pose& pose() const { return pose_; }
 
   /// V x 3, in the rest pose, m.
   const Vertices& rest() const { return rest_; }
@@ -29,7 +29,7 @@ class StandingBody {
 
  private:
   const BodyModel& model_;
-  BodyState state_;
+  Pose pose_;
   Vertices rest_, rest_normals_, rest_joints_;
   PosedSkin skin_;
   Vertices normals_;

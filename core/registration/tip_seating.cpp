@@ -1,5 +1,6 @@
 #include "core/registration/tip_seating.h"
 
+#include <algorithm>
 #include <cmath>
 #include <limits>
 #include <utility>
@@ -76,7 +77,9 @@ int seatTips(const ScanSurface& scan, const BodyModel& model, const Eigen::Vecto
   if (const auto problem = options.firstViolation()) throw InvalidInput("tip options", *problem);
   std::vector<std::int32_t> tips;
   for (const double reach : options.reaches)
-    for (const auto joint : tipsOf(model, reach)) tips.push_back(joint);
+    for (const auto joint : tipsOf(model, reach))
+      if (std::ranges::find(tips, joint) == tips.end()) tips.push_back(joint);
+  if (tips.empty()) return 0;
   const Pose likely = restPose(model.skeleton());
   std::optional<StandingBody> body(std::in_place, model, BodyState{identity, pose});
   int seated = 0;
